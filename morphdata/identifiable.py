@@ -35,6 +35,8 @@ class Identifiable:
         Whether it is searched only where a request lists it or gives its bounds.
     value_description : str, optional
         Of a correction's value.
+    apart_description : str, optional
+        Of its values by surface, where unlike surfaces may have their own.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Identifiable:
     own_default: bool = False
     on_request: bool = False
     value_description: str | None = None
+    apart_description: str | None = None
 
 
 IDENTIFIABLE: list[Identifiable] = [
@@ -54,7 +57,14 @@ IDENTIFIABLE: list[Identifiable] = [
     Identifiable("damping_nms_rad", 0.0, 1e10, positive=True),
     Identifiable("division", 0.0, 1.0, bounds_description="[low, high] of a link's share of the span."),
     Identifiable(
-        "lift_factor", 0.0, 10.0, positive=True, value=Annotated[float, Field(gt=0.0, le=100.0)], default=1.0
+        "lift_factor",
+        0.0,
+        10.0,
+        positive=True,
+        value=Annotated[float, Field(gt=0.0, le=100.0)],
+        default=1.0,
+        value_description="Of all surfaces that `lift_factors` does not name.",
+        apart_description="Lift factors of surfaces that have their own, mirror images by a name for both.",
     ),
     Identifiable(
         "ac_offset_m",

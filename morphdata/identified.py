@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from morphdata.base import Result
 from morphdata.identify import Correction
+from morphdata.links import LinksPerWing
 from morphdata.measurement import SampleMeasurement
 from morphdata.renamed import FORMER_NOTE, under_both_spellings
 from morphdata.uncertainty import PosteriorSummary, Profile
@@ -52,7 +53,10 @@ class SampleFit(Result):
 class AeroCorrections(Result):
     """Identified aerodynamic corrections."""
 
-    lift_factor: float
+    lift_factor: float = Field(description="Of all surfaces that `lift_factors` does not name.")
+    lift_factors: dict[str, float] | None = Field(
+        default=None, description="Of surfaces with their own, mirror images by a name for both."
+    )
     ac_offset_m: float = Field(description="Aerodynamic-centre offset, forward positive.")
     centre_shift_m: float | None = Field(
         default=None,
@@ -80,7 +84,7 @@ class AeroCorrections(Result):
 class IdentifiedParameters(Result):
     """The identified equivalent model."""
 
-    links_per_wing: int
+    links_per_wing: LinksPerWing
     division: list[Any] = Field(description="Share of the span of each link.")
     stiffness_nm_rad: list[Any] = Field(description="Per joint [flap, torsion, edgewise].")
     damping_nms_rad: list[Any] = Field(description="Per joint [flap, torsion, edgewise].")
@@ -90,7 +94,7 @@ class IdentifiedParameters(Result):
 class LinksTried(Result):
     """A number of links per wing that was tried."""
 
-    links_per_wing: int
+    links_per_wing: LinksPerWing
     log_likelihood: float = Field(
         description="Natural logarithm of how likely the training samples are under this model, over how "
         "likely they are under the one that was chosen."
@@ -110,6 +114,7 @@ class SearchReport(Result):
     aero_coefficients: list[Correction] | None = Field(
         default=None, description="Aerodynamic corrections that were searched."
     )
+    own_lift: list[str] = Field(default=[], description="Surfaces with a lift factor of their own.")
     prior_rad: float | None = Field(
         default=None,
         description="Being off the physical guess by one search coordinate (a factor e of a stiffness) "

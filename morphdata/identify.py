@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
@@ -12,12 +13,23 @@ from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Document
 from morphdata.execution import Request, SpreadExecution
 from morphdata.faults import Fault
-from morphdata.flight import EXAMPLE_FLIGHT, Auto, Flight
+from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.identifiable import IDENTIFIABLE, Identifiable, corrections
 from morphdata.lattice import Lattice, Start, StepS
+from morphdata.links import (
+    MAX_WINGS,
+    AskedLinks,
+    LinksPerWing,
+    SurfaceKey,
+    shown_links,
+    shown_per_wing,
+    to_choose,
+    with_links,
+)
 from morphdata.measurement import Measurement, absent_channels, foreign_channels
 from morphdata.options import MODEL, SEARCH, VEHICLE, Option
-from morphdata.parameters import MAX_LINKS, parameters_in
+from morphdata.pairs import links_by_name, links_faults, own_lift_faults
+from morphdata.parameters import parameters_in
 from morphdata.renamed import RENAMED, both_spellings, current_name
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
@@ -37,7 +49,6 @@ else:
         WithJsonSchema({"type": "string", "enum": both_spellings(corrections())}),
     ]
 Method = Literal["hybrid", "least_squares", "cma", "pso"]
-Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
 AUTO_LINKS = (1, 2, 3, 4, 5, 6)  # numbers of links per wing that "auto" tries, in this order
 Range = Annotated[
     list[Annotated[float, Field(ge=-1e15, le=1e15)]],
@@ -119,6 +130,13 @@ class SearchedModel(Document):
     separate_wings: Annotated[bool, Option("--separate-wings", MODEL)] = Field(
         default=False, description="Left and right wings get parameters of their own."
     )
+    own_lift: Annotated[list[SurfaceKey] | None, Option("--own-lift", MODEL)] = Field(
+        default=None,
+        max_length=MAX_WINGS,
+        description="Surfaces that get a lift factor of their own, mirror images by a name for both; the "
+        "others share one. Left out: one for all, and one for each where three training samples or more tell "
+        "them apart.",
+    )
     aero_coefficients: Annotated[list[Correction] | None, BeforeValidator(_current_corrections)] = Field(
         default=None,
         max_length=len(both_spellings(corrections())),
@@ -140,8 +158,12 @@ class SearchedModel(Document):
         default="trim", description="Trim each model by itself, or start from `flight.start`."
     )
 
-    def numbers_of_links(self) -> Sequence[int]:
-        """List the numbers of links per wing of all models that are searched."""
+    def numbers_of_links(self) -> Sequence[LinksPerWing]:
+        """List the links per wing of all models that are searched."""
+        raise NotImplementedError
+
+    def links_at(self) -> Iterator[tuple[str, LinksPerWing]]:
+        """Give those that name surfaces, with their pointers below `links_per_wing`."""
         raise NotImplementedError
 
     def faults(self) -> Iterator[Fault]:
@@ -149,9 +171,20 @@ class SearchedModel(Document):
         yield from repeated_faults(
             self.aero_coefficients or (), "/aero_coefficients", "Name each correction once."
         )
+        listed = self.aero_coefficients
+        if self.own_lift and listed is not None and "lift_factor" not in listed:
+            yield Fault(
+                "not_searched",
+                "own_lift names surfaces, but no lift factor is searched.",
+                "/own_lift",
+                "Add lift_factor to aero_coefficients, or leave own_lift out.",
+            )
         division = None if self.bounds is None else self.bounds.given().get("division")
         if division is not None:
-            yield from _division_faults(self.numbers_of_links(), *division)
+            numbers = [
+                links.values() if isinstance(links, dict) else [links] for links in self.numbers_of_links()
+            ]
+            yield from _division_faults([links for each in numbers for links in each], *division)
 
 
 def repeated_faults(items: Sequence[object], pointer: str, hint: str) -> Iterator[Fault]:
@@ -180,15 +213,21 @@ def _division_faults(numbers: Sequence[int], low: float, high: float) -> Iterato
 class EquivalentModel(SearchedModel):
     """The model whose parameters are searched: wings of rigid links with gimbal joints."""
 
-    links_per_wing: Annotated[Links | Auto, Option("--links", MODEL)] = Field(
+    links_per_wing: Annotated[AskedLinks, Option("--links", MODEL)] = Field(
         default=3,
-        description="Links per wing. `auto`: models of one link, two links and so on up to six are "
+        description="Links per wing: one number for all flexible surfaces, or one for each by name, mirror "
+        "images by a name for both. `auto`: models of one link, two links and so on up to six are "
         "identified, and the one under which the training samples are most likely is taken.",
     )
 
-    def numbers_of_links(self) -> Sequence[int]:
+    def numbers_of_links(self) -> Sequence[LinksPerWing]:
         """List the number of links per wing, or all that are tried."""
-        return AUTO_LINKS if self.links_per_wing == "auto" else (self.links_per_wing,)
+        numbers = AUTO_LINKS if to_choose(self.links_per_wing) else AUTO_LINKS[:1]
+        return [with_links(self.links_per_wing, number) for number in numbers]
+
+    def links_at(self) -> Iterator[tuple[str, LinksPerWing]]:
+        """Give those that name surfaces; numbers that are tried name the same."""
+        yield "", self.numbers_of_links()[-1]
 
 
 class Search(SwarmSearch):
@@ -262,6 +301,9 @@ class SamplesRequest(Request):
         yield from start_faults(self.flight, self.model.start)
         yield from trim_drive_faults(self.aircraft, self.flight)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_identify")
+        for pointer, links in self.model.links_at():
+            yield from links_faults(self.aircraft, links, f"/model/links_per_wing{pointer}")
+        yield from own_lift_faults(self.aircraft, self.model.own_lift or (), "/model/own_lift")
         yield from samples_faults(self.samples)
         samples = self.inline_samples()
         yield from total_rows_faults(sum(len(sample.time_s) for sample in samples.values()))
@@ -345,20 +387,22 @@ class IdentifyRequest(SamplesRequest):
             return
         yield from model_surfaces_faults(self.aircraft, known, "/search/warm_start/parameters")
         at, links = "/search/warm_start/parameters", self.model.links_per_wing
-        if links == "auto":
+        own = self.model.numbers_of_links()[0]
+        if to_choose(links):
             yield Fault(
                 "links_differ",
                 "The number of links per wing is to be chosen, and the model to begin from has one already.",
                 at,
-                f"Set model.links_per_wing to {known.links_per_wing}, or begin from no model.",
+                f"Set model.links_per_wing to {json.dumps(known.links_per_wing)}, or begin from no model.",
             )
-        elif known.links_per_wing != links:
+        elif links_by_name(self.aircraft, known.links_per_wing) != links_by_name(self.aircraft, own):
             yield Fault(
                 "links_differ",
-                f"The search is for {links} links per wing and would begin from a model with "
-                f"{known.links_per_wing}.",
+                f"The search is for {shown_per_wing(own)} and would begin from a model with "
+                f"{shown_links(known.links_per_wing)}.",
                 at,
-                f"Begin from a model with {links}, or set model.links_per_wing to {known.links_per_wing}.",
+                "Begin from a model with as many, or set model.links_per_wing to "
+                f"{json.dumps(known.links_per_wing)}.",
             )
         elif known.separate_wings and not self.model.separate_wings:
             yield Fault(

@@ -12,11 +12,10 @@ from morphdata.base import Document, Identifier
 from morphdata.faults import Fault
 from morphdata.identifiable import IDENTIFIABLE
 from morphdata.lattice import OWN_OR_CHOSEN, FlightStepS, Lattice, Start, StepS
+from morphdata.links import MAX_LINKS, MAX_WINGS, LinksPerWing, SurfaceKey, links_of
 from morphdata.options import MODEL, Option
 from morphdata.refusals import escaped
 
-MAX_LINKS = 16
-MAX_WINGS = 16
 AXES = 3  # flap, torsion, edgewise
 SUM_TOLERANCE = 1e-6  # tolerance of the division: documents may be rounded for printing
 RAGGED = -1  # stands for the length of rows of different lengths
@@ -54,6 +53,14 @@ else:  # type checkers cannot use fields from a list
             )
             for each in IDENTIFIABLE
             if each.value is not None
+        },
+        **{
+            f"{each.name}s": (
+                dict[SurfaceKey, each.value] | None,
+                Field(default=None, max_length=MAX_WINGS, description=each.apart_description),
+            )
+            for each in IDENTIFIABLE
+            if each.apart_description
         },
     )
 
@@ -93,7 +100,7 @@ class Parameters(Document):
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_PARAMETERS]})
 
-    links_per_wing: int = Field(ge=1, le=MAX_LINKS)
+    links_per_wing: LinksPerWing = Field(description="Of all flexible surfaces, or of each by name.")
     separate_wings: bool = False
     division: Shares | Annotated[list[Shares], Field(min_length=1, max_length=MAX_WINGS)] = Field(
         description="Share of the span of each link; one list per wing if wings are separate."
@@ -125,13 +132,18 @@ class Parameters(Document):
 
     def faults(self) -> Iterator[Fault]:
         """Check that the lists match the number of links and the shares add up to the whole span."""
-        yield from _structure_faults(self, self.links_per_wing)
         surfaces = self.surfaces or {}
+        links, faults = self._links_of_surfaces()
+        yield from faults
+        if faults:
+            return
+        flat = self.links_per_wing if isinstance(self.links_per_wing, int) else len(self.divisions[0])
+        yield from _structure_faults(self, flat)
         yield from _own_default_faults(self.aero, surfaces)
         for name, own in surfaces.items():
             at = f"/surfaces/{escaped(name)}"
             if isinstance(own, SurfaceParameters):
-                yield from (fault.under(at) for fault in _structure_faults(own, self.links_per_wing))
+                yield from (fault.under(at) for fault in _structure_faults(own, links[name]))
             elif isinstance(surfaces.get(own.mirror_of, own), MirroredParameters):
                 yield Fault(
                     "mirrors_nothing",
@@ -139,6 +151,21 @@ class Parameters(Document):
                     f"{at}/mirror_of",
                     "Name a surface with its own parameters.",
                 )
+
+    def _links_of_surfaces(self) -> tuple[dict[str, int], list[Fault]]:
+        """Return the links of each of `surfaces`, and what is wrong with `links_per_wing`."""
+        surfaces = self.surfaces or {}
+        if not (surfaces or isinstance(self.links_per_wing, int)):
+            hint = "Give one number, or the model of an identification's result unchanged."
+            said = "links_per_wing is by surface, but the model has no surfaces."
+            return {}, [Fault("missing", said, "/surfaces", hint)]
+        names = list(surfaces)
+        groups: dict[str, list[int]] = {}
+        for k, (name, own) in enumerate(surfaces.items()):
+            groups.setdefault(own.mirror_of if isinstance(own, MirroredParameters) else name, []).append(k)
+        bent = [True] * len(names)
+        counts, faults = links_of(self.links_per_wing, names, bent, [*groups.values()], "/links_per_wing")
+        return dict(zip(names, counts, strict=True)), faults
 
 
 def _own_default_faults(aero: Document, surfaces: Mapping[str, Document]) -> Iterator[Fault]:

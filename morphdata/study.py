@@ -11,13 +11,11 @@ from morphdata.base import Result
 from morphdata.faults import Fault
 from morphdata.identified import Angles, IdentifiedParameters, SampleFit
 from morphdata.identify import EXAMPLE_REQUEST, SamplesRequest, SearchedModel, repeated_faults
+from morphdata.links import MAX_LINKS, LinksPerWing
 from morphdata.measurement import SampleMeasurement
 from morphdata.options import MODEL, Option
-from morphdata.parameters import MAX_LINKS
 from morphdata.verdict import Verdict
 from morphdata.warnings import Warnings
-
-Links = Annotated[int, Field(ge=1, le=MAX_LINKS)]
 
 EXAMPLE_STUDY: dict[str, Any] = {**EXAMPLE_REQUEST, "model": {"links_per_wing": [1, 2, 3, 4]}}
 
@@ -25,17 +23,21 @@ EXAMPLE_STUDY: dict[str, Any] = {**EXAMPLE_REQUEST, "model": {"links_per_wing": 
 class StudiedModels(SearchedModel):
     """The compared models: the same wings with different numbers of links."""
 
-    links_per_wing: Annotated[list[Links], Option("--links", MODEL)] = Field(
+    links_per_wing: Annotated[list[LinksPerWing], Option("--links", MODEL)] = Field(
         default=[1, 2, 3, 4, 5, 6],
         min_length=1,
         max_length=MAX_LINKS,
         description="Numbers of links to compare, all different; 1 is the rigid model with its aerodynamic "
-        "corrections searched.",
+        "corrections searched. Each is one number for all flexible surfaces, or one for each by name.",
     )
 
-    def numbers_of_links(self) -> Sequence[int]:
+    def numbers_of_links(self) -> Sequence[LinksPerWing]:
         """List the compared numbers of links per wing."""
         return self.links_per_wing
+
+    def links_at(self) -> Iterator[tuple[str, LinksPerWing]]:
+        """Give those that name surfaces, with their places in the list."""
+        yield from ((f"/{number}", links) for number, links in enumerate(self.links_per_wing))
 
     def faults(self) -> Iterator[Fault]:
         """Check that each number of links is listed once, and check every such model."""
@@ -57,7 +59,7 @@ class StudyRequest(SamplesRequest):
 class StudyRow(Result):
     """Accuracy and cost of one number of links per wing."""
 
-    links_per_wing: int
+    links_per_wing: LinksPerWing
     bodies: int = Field(description="Rigid bodies of the whole model, fuselage included.")
     parameters: int = Field(description="Unknowns of the identification.")
     J_train: float | None = Field(description="Sum of squared angle errors over the fitted flights, rad^2.")
@@ -82,7 +84,7 @@ class StudyRow(Result):
 class Recommendation(Result):
     """The recommended number of links."""
 
-    links_per_wing: int | None = Field(description="null if no model could be flown")
+    links_per_wing: LinksPerWing | None = Field(description="null if no model could be flown")
     reason: str
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TypeVar
 
 from morphdata.aircraft import Aircraft
 from morphdata.controls import control_names
 from morphdata.drives import without_side
 from morphdata.faults import Fault
 from morphdata.flight import Flight
+from morphdata.links import by_pair
+from morphdata.pairs import mirror_pairs
 from morphdata.parameters import Parameters
 from morphdata.trim_drives import PITCH, ROLL, YAW, ControlPart, balancing, meant
-
-T = TypeVar("T")
 
 
 def start_faults(flight: Flight, start: str | None) -> Iterator[Fault]:
@@ -117,6 +116,10 @@ def model_surfaces_faults(aircraft: Aircraft, model: Parameters | None, pointer:
     """Check that an equivalent model has parameters for every flexible surface of an aircraft."""
     if model is None:
         return
+    factors = getattr(model.aero, "lift_factors", None)
+    if factors:
+        names = [surface.name for surface in aircraft.surfaces]
+        yield from by_pair(factors, names, mirror_pairs(aircraft), f"{pointer}/aero/lift_factors")[1]
     flexible = [surface.name for surface in aircraft.surfaces if surface.flexible]
     hint = "Give a model that was identified for this aircraft."
     if model.surfaces:
@@ -135,26 +138,3 @@ def model_surfaces_faults(aircraft: Aircraft, model: Parameters | None, pointer:
             f"{pointer}/division",
             hint,
         )
-
-
-def paired_by_reflection(surfaces: Sequence[T], reflections: Sequence[T]) -> tuple[tuple[int, ...], ...]:
-    """Indices of surfaces by mirror pair, in order of first appearance.
-
-    Parameters
-    ----------
-    surfaces, reflections : sequence
-        Each surface and its mirror image, both without their names, which are not compared.
-
-    Returns
-    -------
-    tuple of tuples of int
-        Groups (first, image) and (first,); every surface is in exactly one.
-    """
-    groups = []
-    waiting = list(range(len(surfaces)))
-    while waiting:
-        first = waiting.pop(0)
-        image = [k for k in waiting if surfaces[k] == reflections[first]][:1]
-        waiting = [k for k in waiting if k not in image]
-        groups.append((first, *image))
-    return tuple(groups)

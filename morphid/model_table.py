@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
+from morphdata.links import shown_per_wing
 from morphdata.renamed import current_name, current_names
 from morphid.screen import new_table, short
 
@@ -37,12 +38,15 @@ def named_parameters(model: Document) -> Iterator[tuple[str, float]]:
                     yield f"{wing}{name}.joint_{j}.{axis}", value
     own_corrections = set.intersection(*map(set, named.values())) if named else set()
     aero = {current_name(name): value for name, value in model["aero"].items()}
+    apart = aero.pop("lift_factors", None) or {}
     for name, value in aero.items():
         yield from (
             ((f"{wing}{name}", own) for wing, own in wings(name))
             if name in own_corrections
             else [(name, value)]
         )
+        if name == "lift_factor":
+            yield from ((f"{surface}.{name}", own) for surface, own in apart.items())
 
 
 def model_table(result: Document) -> Table:
@@ -54,7 +58,7 @@ def model_table(result: Document) -> Table:
     intervals = {current_name(name): ends for name, ends in (uncertainty.get("interval_95") or {}).items()}
     unseen = current_names(uncertainty.get("undetermined") or ())
     bound = current_names(uncertainty.get("at_bound") or ())
-    title = f"Equivalent model, {model['links_per_wing']} links per wing"
+    title = f"Equivalent model, {shown_per_wing(model['links_per_wing'])}"
     bounds = {
         current_name(name): each for name, each in (uncertainty.get("cramer_rao_percent") or {}).items()
     }

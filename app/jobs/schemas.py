@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from app.jobs.records import Job as StoredJob
 from app.jobs.records import JobStatus
 from app.keys.schemas import Quotas
+from morphdata.links import LinksPerWing
 from morphdata.operations import OPERATIONS
 
 EXAMPLE_ID = "job_01k0c3v9fh8x2m4n6p8q0r2s4t"
@@ -67,8 +68,10 @@ class RequestSummary(BaseModel):
     model_config = ConfigDict(extra="allow")
 
     aircraft: str | None = None
-    links_per_wing: int | None = Field(default=None, description="Of the equivalent model.")
-    compared_links: list[int] = Field(default=[], description="Numbers of links per wing of a study.")
+    links_per_wing: LinksPerWing | None = Field(default=None, description="Of the equivalent model.")
+    compared_links: list[LinksPerWing] = Field(
+        default=[], description="Numbers of links per wing of a study."
+    )
     model: str | None = Field(default=None, description="The model that a simulation flies.")
     method: str | None = Field(default=None, description="Of the search.")
     drives: list[str] = Field(

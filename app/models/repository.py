@@ -13,6 +13,7 @@ from app.leases import LeasedRow
 from app.models.schemas import ModelPage, ModelSummary
 from app.pages import read_page
 from app.tables import jobs, models
+from morphdata.links import shown_per_wing
 
 NAME_LENGTH = 200
 
@@ -43,9 +44,9 @@ def insert_model(session: Session, job: LeasedRow, identified: Document) -> None
         insert(models).values(
             id=model_id,
             owner=job.owner,
-            name=f"{name}, {links} links per wing"[:NAME_LENGTH],
+            name=(f"{name}, {shown_per_wing(links)}" if links else name)[:NAME_LENGTH],
             job_id=job.id,
-            links_per_wing=links,
+            links_per_wing=max(links.values()) if isinstance(links, dict) else links,
             document=stored,
             created_at=database_time(),
             key_id=job.key_id,

@@ -17,7 +17,7 @@ class ModelSummary(BaseModel):
 
     id: str = Field(examples=["model_01k0c3v9fh8x2m4n6p8q0r2s4t"])
     name: str
-    links_per_wing: int | None
+    links_per_wing: int | None = Field(description="The most of any surface, where they differ.")
     job_id: str | None = Field(description="The job that identified it; null if deleted.")
     created_at: datetime
 

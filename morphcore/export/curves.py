@@ -8,6 +8,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from morphdata.links import shown_links
 from morphdata.measurement import ANGLE_COLUMNS
 from morphdata.samplefiles.csv_table import write_table
 
@@ -126,6 +127,9 @@ def study_table(document: Document) -> bytes:
     rows = document["rows"]
     recommended = (document.get("recommended") or {}).get("links_per_wing")
     columns = {name: [row.get(name) for row in rows] for name in STUDY_COLUMNS}
+    columns["links_per_wing"] = [
+        links if isinstance(links := row["links_per_wing"], int) else shown_links(links) for row in rows
+    ]
     for angle in ("phi", "theta", "psi"):
         columns[f"rms_{angle}_rad"] = [(row.get("rms_rad") or {}).get(angle) for row in rows]
     columns["recommended"] = ["yes" if row["links_per_wing"] == recommended else "" for row in rows]

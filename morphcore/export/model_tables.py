@@ -11,10 +11,11 @@ from 0 here (in MATLAB files from 1).
     ``aircraft``, ``flight`` and ``model`` as JSON text, in the form used by requests.
 ``parameters``
     By their names, ``division`` (f, n), ``stiffness_nm_rad`` and ``damping_nms_rad`` (f, n - 1, 3) of flap,
-    torsion and edgewise, others (f,), or () for the whole aircraft; ``surface_index`` (f,).
+    torsion and edgewise, others (f,), or () for the whole aircraft; ``surface_index`` (f,). Where numbers of
+    links differ, n is the largest, and the rows of other surfaces end in zeros.
 ``surfaces``
     ``name``, ``side`` (s,); ``root_m`` (s, 3) origin of the first link in B; ``rotation`` (s, 3, 3) of the
-    surface's axes to B with all hinges at zero; ``first_link_index``, ``links`` (s,).
+    surface's axes to B with all hinges at zero; ``first_link_index``, ``links``, ``lift_factor`` (s,).
 ``links``
     ``surface_index`` (l,); ``length_m`` (l,); ``origin_m`` (l, 3) from the origin of the link before, in its
     axes (of a first link from the reference point, in B); ``mass_kg`` (l,); ``centre_of_mass_m`` (l, 3) and
@@ -55,6 +56,7 @@ from morphcore.geometry.surface import Surface
 from morphcore.models.equivalent import ChainModel, ParameterBatch
 from morphcore.models.links import link_edges, link_masses
 from morphcore.models.lumps import FLAT_ROWS, link_lumps
+from morphcore.models.parameter_batch import together
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.simulate.plan import FlightPlan, flight_plan
 from morphcore.simulate.schedule import Hold
@@ -95,7 +97,7 @@ def model_tables(file: ModelFile, chain: ChainModel, batch: ParameterBatch, foun
             for name in ("aircraft", "flight", "model")
         },
         "parameters": _parameters(chain, batch),
-        "surfaces": _surfaces(chain),
+        "surfaces": _surfaces(chain, batch),
         "links": _links(chain, batch),
         "joints": _joints(chain, batch),
         "hinges": _hinges(chain.aircraft),
@@ -128,9 +130,9 @@ def _parameters(chain: ChainModel, batch: ParameterBatch) -> Table:
     own = [chain.on_surface(batch, k) for k in chain.flexible]
     for parameter in chain.parameters:
         if parameter.scope == "aircraft":
-            table[parameter.name] = np.array(batch[parameter.name][0])
+            table[parameter.name] = np.array(batch.of_aircraft(parameter.name)[0])
         else:
-            table[parameter.name] = np.stack([values[parameter.name][0] for values in own])
+            table[parameter.name] = together([values[parameter.name][:1] for values in own])[0]
     return table
 
 
@@ -139,8 +141,9 @@ def _root(surface: Surface) -> Array:
     return np.asarray(np.add(surface.position_m, surface.rest_R_BW @ surface.elastic_axis_W))
 
 
-def _surfaces(chain: ChainModel) -> Table:
+def _surfaces(chain: ChainModel, batch: ParameterBatch) -> Table:
     surfaces = chain.aircraft.surfaces
+    factors = [chain.on_surface(batch, number)["lift_factor"][0] for number in range(len(surfaces))]
     return {
         "name": np.array([surface.name for surface in surfaces]),
         "side": np.array([surface.side for surface in surfaces]),
@@ -148,6 +151,7 @@ def _surfaces(chain: ChainModel) -> Table:
         "rotation": np.stack([surface.rest_R_BW for surface in surfaces]),
         "first_link_index": chain.surfaces[:, 0].copy(),
         "links": chain.surfaces[:, 1].copy(),
+        "lift_factor": np.array(factors),
     }
 
 

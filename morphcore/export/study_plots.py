@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,6 +21,7 @@ from morphcore.export.figure import (
     power_of_ten,
     rendered,
 )
+from morphdata.links import LinksPerWing, mean_links, shown_per_wing
 
 MILLISECONDS = 1e3  # of a second
 MARGIN = 1.8  # factor above the largest and below the smallest value
@@ -79,8 +81,8 @@ def study_figure(document: Document) -> Figure:
 # pieces
 
 
-def _recommended(document: Document) -> int | None:
-    chosen: int | None = (document.get("recommended") or {}).get("links_per_wing")
+def _recommended(document: Document) -> LinksPerWing | None:
+    chosen: LinksPerWing | None = (document.get("recommended") or {}).get("links_per_wing")
     return chosen
 
 
@@ -89,19 +91,20 @@ def _title(document: Document) -> str:
     said = "accuracy, and wall time of one flight"
     said += f" of {duration_s:g} s on one core" if duration_s else ""
     chosen = _recommended(document)
-    return said if chosen is None else f"{said}; recommended: {chosen} link{'s' * (chosen != 1)} per wing"
+    return said if chosen is None else f"{said}; recommended: {shown_per_wing(chosen)}"
 
 
 def _abscissa(axes: Axes, document: Document) -> None:
-    """One tick for each number of links, and a band behind the recommended one."""
-    numbers = sorted(row["links_per_wing"] for row in document["rows"]) or [1]
-    axes.set_xticks(range(numbers[0], numbers[-1] + 1))
+    """One tick for each number of links, and a band behind the recommended one; means where they differ."""
+    numbers = sorted(mean_links(row["links_per_wing"]) for row in document["rows"]) or [1]
+    axes.set_xticks(range(math.floor(numbers[0]), math.ceil(numbers[-1]) + 1))
     axes.set_xlim(numbers[0] - 0.5, numbers[-1] + 0.5)
     axes.tick_params(labelsize=8.5)
     light_grid(axes)
     chosen = _recommended(document)
     if chosen is not None:
-        axes.axvspan(chosen - 0.28, chosen + 0.28, zorder=0, color=CHOSEN_COLOUR, linewidth=0)
+        middle = mean_links(chosen)
+        axes.axvspan(middle - 0.28, middle + 0.28, zorder=0, color=CHOSEN_COLOUR, linewidth=0)
 
 
 def _line(
@@ -109,7 +112,9 @@ def _line(
 ) -> list[float]:
     """Draw one figure for all rows that have it; return its values."""
     points = sorted(
-        (row["links_per_wing"], factor * row[name]) for row in document["rows"] if is_cost(row.get(name))
+        (mean_links(row["links_per_wing"]), factor * row[name])
+        for row in document["rows"]
+        if is_cost(row.get(name))
     )
     if points:
         links, values = zip(*points, strict=True)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from morphcore.geometry.aircraft import Aircraft, Flight, Fuselage
 from morphcore.geometry.surface import Surface
-from morphdata.vehicle import paired_by_reflection
+from morphdata.pairs import paired_by_reflection
 
 Array = NDArray[np.float64]
 

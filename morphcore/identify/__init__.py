@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
@@ -13,6 +13,7 @@ from morphcore.threads import use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, IdentifyRequest, IdentifySearch, SamplesRequest
+from morphdata.links import AskedLinks, to_choose
 from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
 
@@ -54,12 +55,15 @@ __all__ = [
 ]
 
 
+LINKS = EquivalentModel().links_per_wing
+
+
 def identify(
     aircraft: AircraftDocument,
     flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
-    links_per_wing: int | Literal["auto"] = EquivalentModel().links_per_wing,
+    links_per_wing: AskedLinks = LINKS,
     seed: int = IdentifySearch().seed,
     model: EquivalentModel | None = None,
     search: IdentifySearch | None = None,
@@ -76,9 +80,9 @@ def identify(
         Its flight condition.
     samples : sequence of Trajectory
         Sample flights, angles in rad; those with role "held_out" are reported, not fitted.
-    links_per_wing : int or "auto"
-        Links per wing, or "auto" for the number under which the flights are most likely; without effect
-        where ``model`` is given.
+    links_per_wing : int, mapping of str to int, or "auto"
+        Links of all flexible surfaces, or of each by name, or "auto" for the number under which the flights
+        are most likely; without effect where ``model`` is given.
     seed : int
         Seed of the search; without effect where ``search`` is given.
     model : EquivalentModel, optional
@@ -147,7 +151,7 @@ def _identification(
     from morphcore.identify.identification import Identification
     from morphcore.identify.settings import search_settings
 
-    kind = AutoIdentification if model.links_per_wing == "auto" else Identification
+    kind = AutoIdentification if to_choose(model.links_per_wing) else Identification
     return kind(
         aircraft,
         flight,

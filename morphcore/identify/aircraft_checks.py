@@ -37,7 +37,7 @@ def wrong_aircraft(
     """Flights that no model of this aircraft flies, or only with a lift that it does not have."""
     number, worst = max(trained, key=lambda each: each[1].error_share())
     share = worst.error_share()
-    if run.model.links_per_wing > 1 and UNLIKE_SHARE < share < np.inf:
+    if run.model.links_per_wing != 1 and UNLIKE_SHARE < share < np.inf:
         start = abs(float(worst.case.sample.theta[0] - worst.initial[0, 1]))
         off = (
             f", and it would begin the flight pitched by {start:.3f} rad otherwise"
@@ -55,10 +55,12 @@ def wrong_aircraft(
         )
     for name, x in zip(run.space.names, best - run.space.guess, strict=True):
         if name.split(".")[-1] == "lift_factor" and abs(x) >= EXTREME_LIFT:
-            value = float(run.space.decode(best[None, :])["lift_factor"].flat[0])
+            values = run.space.flatten(run.space.decode(best[None, :]))[0]
+            value = values[run.space.parameter_names.index(name)]
+            whose = name.rpartition(".")[0] or "this aircraft"
             yield ResultWarning(
                 "wrong_aircraft",
-                f"the flights need a lift of {value:.2f} times that of this aircraft",
+                f"the flights need a lift of {value:.2f} times that of {whose}",
                 WRONG_AIRCRAFT_HINT,
                 "/aircraft",
             )

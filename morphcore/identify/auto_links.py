@@ -25,6 +25,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphcore.stopping import Stop
 from morphcore.threads import one_blas_thread
 from morphdata.identify import AUTO_LINKS, EquivalentModel
+from morphdata.links import LinksPerWing, mean_links, shown_links, with_links
 from morphdata.measurement import Measurement
 from morphdata.uncertainty import UncertaintySettings
 
@@ -132,13 +133,14 @@ class AutoIdentification:
         smoothed = smoothed_samples(aircraft, samples, measurement)
 
         def run(links: int) -> Identification:
-            settings = model.model_copy(update={"links_per_wing": links})
+            asked = with_links(model.links_per_wing, links)
+            settings = model.model_copy(update={"links_per_wing": asked})
             return Identification(
                 aircraft,
                 flight,
                 smoothed,
                 settings,
-                self._settings(links),
+                self._settings(asked),
                 measurement=measurement,
                 uncertainty=uncertainty,
                 clock=clock,
@@ -147,9 +149,9 @@ class AutoIdentification:
         # all at once: what is wrong with the settings of six links is said before one link is identified
         self.runs = {links: run(links) for links in AUTO_LINKS}
 
-    def _settings(self, links: int) -> SearchSettings:
+    def _settings(self, links: LinksPerWing) -> SearchSettings:
         """As requested, but a rigid wing, which may fit nothing, is not searched for elsewhere."""
-        rigid = links == 1 and self.search.method == "hybrid"
+        rigid = mean_links(links) == 1 and self.search.method == "hybrid"
         return replace(self.search, method="least_squares") if rigid else self.search
 
     def steps(self, checkpoint: bytes | None = None, stop: Stop | None = None) -> Iterator[Step]:
@@ -211,7 +213,7 @@ class AutoIdentification:
         flights = state.flights + step.flights
         if step.fraction >= 1.0:
             moved = self._ended(moved, run, links, step)
-        message = f"{links} link{'s' if links > 1 else ''}: {step.message}"
+        message = f"{shown_links(run.model.links_per_wing)}: {step.message}"
         return moved, replace(step, generation=moved.generation, flights=flights, message=message)
 
     def _ended(self, state: AutoState, run: Identification, links: int, step: Step) -> AutoState:
@@ -242,7 +244,7 @@ class AutoIdentification:
         likelihood = state.likelihoods()
         tried = [
             {
-                "links_per_wing": each.links,
+                "links_per_wing": self.runs[each.links].model.links_per_wing,
                 "log_likelihood": likelihood[each.links],
                 "J_train": each.best_cost,
                 "flights": each.flights,

@@ -83,7 +83,7 @@ def diagnoses(
             found += _drive_warnings(run, fit, f"/samples/{number}")
     trained = [(number, fit) for number, fit in enumerate(fits) if fit.case.sample.role == "train"]
     flies = all(np.all(np.isfinite(fit.identified)) for _, fit in trained)
-    chain = run.space.dimension > 0 and run.model.links_per_wing > 1
+    chain = run.space.dimension > 0 and run.model.links_per_wing != 1
     if fly and flies and chain and max(fit.error_share() for _, fit in trained) > LATE_SHARE:
         for look in (late_warnings, cut_off_warnings):
             if not _explained(found):
@@ -183,7 +183,7 @@ def _drive_warnings(run: Identification, fit: SampleFit, pointer: str) -> Iterat
     """Units, signs and sides of drives: each reading is flown by the physical guess."""
     sample = fit.case.sample
     # a rigid model leaves what bending does; a chain does not
-    if not fit.error_share() > (POOR_SHARE if run.model.links_per_wing > 1 else HALF):
+    if not fit.error_share() > (POOR_SHARE if run.model.links_per_wing != 1 else HALF):
         return
     given = min(attitude_cost(sample, flown) for flown in (fit.initial, fit.identified))
     motion = float(np.sum(fit.case.motion**2))

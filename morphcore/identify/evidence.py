@@ -187,3 +187,29 @@ def _fitted(linear: Linear, weights: Array, count: float) -> tuple[Array, Array]
 def log_evidence(linear: Linear, count: float | None = None) -> float:
     """Logarithm of the marginal likelihood with the likeliest weight of the prior."""
     return float(log_likelihood(linear, WEIGHTS, count).max())
+
+
+def left_out(
+    error: Array, jacobian: Array, offset: Array, weight: float, ends: Sequence[int] | NDArray[np.int64]
+) -> float:
+    """J of flights (rad^2), each as the others predict it, to first order.
+
+    Parameters
+    ----------
+    error, jacobian : ndarray, shape (m,) and (m, d)
+        Residuals at a point, rad, and their derivatives.
+    offset : ndarray, shape (d,)
+        The point less the guess that the prior draws to.
+    weight : float
+        Of the prior, rad^2 a squared unit.
+    ends : sequence of int
+        Rows after the last one of each flight.
+    """
+    normal, pull = jacobian.T @ jacobian, jacobian.T @ error + weight * offset
+    prior, found, first = weight * np.eye(offset.size), 0.0, 0
+    for end in ends:
+        own, left = jacobian[first:end], error[first:end]
+        change = np.linalg.lstsq(normal - own.T @ own + prior, own.T @ left - pull, rcond=1e-14)[0]
+        found += float(np.sum((left + own @ change) ** 2))
+        first = int(end)
+    return found

@@ -15,7 +15,13 @@ from morphcore.identify.cost import SampleCase, costs, longest_step, residuals, 
 from morphcore.identify.descents import METHODS, PRIOR_RAD, descent
 from morphcore.identify.drive_histories import SmoothedSamples, smoothed_samples
 from morphcore.identify.first_angles import first_angle_columns, with_first_angles
-from morphcore.identify.free_corrections import determined_corrections, linearised, spare_corrections
+from morphcore.identify.free_corrections import (
+    OWN_LIFT,
+    determined_corrections,
+    linearised,
+    sources,
+    spare_freedoms,
+)
 from morphcore.identify.free_start import with_start
 from morphcore.identify.measurement import Openness, first_openness, measured
 from morphcore.identify.other_readings import require_seconds
@@ -39,6 +45,7 @@ from morphcore.stopping import Deadline, Stop, say
 from morphcore.threads import one_blas_thread
 from morphdata.faults import refuse
 from morphdata.identify import EquivalentModel
+from morphdata.links import LinksPerWing, to_choose
 from morphdata.measurement import Measurement, foreign_channels
 from morphdata.uncertainty import UncertaintySettings
 
@@ -112,43 +119,43 @@ class Identification:
             raise InvalidInput(
                 "the flight has no start", pointer="/flight/start", hint='add it, or use start = "trim"'
             )
-        if self.settings.links_per_wing == "auto":
+        if to_choose(self.settings.links_per_wing):
             raise InvalidInput(
                 "one identification has one number of links per wing",
                 pointer="/model/links_per_wing",
                 hint='use AutoIdentification, or identify(..., links_per_wing="auto")',
             )
-        self.model = self.chain(aircraft, flight, self.settings.links_per_wing)
+        self.model = self.chain(aircraft, flight, self.settings.numbers_of_links()[0])
         self._bounds = None if self.settings.bounds is None else self.settings.bounds.given()
         training = [sample for sample in samples.given if sample.role == "train"]
         given: Sequence[str] | None = self.settings.aero_coefficients
         determined = determined_corrections(self.model.parameters, training, self._bounds or ())
         # that are searched from the beginning
         self.first_corrections: tuple[str, ...] = determined if given is None else tuple(given)
-        # a rigid wing misses so much that anything would explain it
-        decided = given is not None or self.model.links_per_wing == 1
-        self._spare = (
-            () if decided else spare_corrections(self.model.parameters, training, self.first_corrections)
-        )
         self.prior_weight = PRIOR_RAD**2  # that the search gives the physical guess by now
         self._begin(())
+        self._spare = spare_freedoms(self, training)
         require_names(self.space, self.uncertainty.profile)
 
     def _begin(self, further: tuple[str, ...]) -> None:
-        """Take up the search space in which further corrections are free: the flights call for them."""
-        self.further_corrections = further
-        self._first_space = search_space(
-            self.model,
-            separate_wings=self.settings.separate_wings,
-            aero_coefficients=(*self.first_corrections, *further),
-            bounds=self._bounds,
-        )
+        """Take up the search space with further freedoms, which the flights call for."""
+        self.further = further
+        self._first_space = self._space_of(further)
         self.space = self._first_space  # the same with the bounds that the search has widened by now
         warm = self.search.warm_start
         # (k, d) what is known before the search: the model to begin from, and always the physical guess
         self.known: Array = np.stack([*([] if warm is None else [self.space.encode(warm)]), self.space.guess])
 
-    def chain(self, aircraft: Aircraft, flight: Flight, links: int) -> ChainModel:
+    def _space_of(self, further: Sequence[str]) -> SearchSpace:
+        return search_space(
+            self.model,
+            separate_wings=self.settings.separate_wings,
+            aero_coefficients=[*self.first_corrections, *(name for name in further if name != OWN_LIFT)],
+            bounds=self._bounds,
+            own_lift=None if OWN_LIFT in further else self.settings.own_lift or (),
+        )
+
+    def chain(self, aircraft: Aircraft, flight: Flight, links: LinksPerWing) -> ChainModel:
         """A chain model with the lattice that the settings ask for."""
         return chain_model(aircraft, flight, links, self.settings.lattice)
 
@@ -218,23 +225,18 @@ class Identification:
         return self.space.named((now.lower < first.lower) | (now.upper > first.upper))
 
     @property
-    def spare_corrections(self) -> tuple[str, ...]:
-        """Names of the corrections that are fixed and would be searched if the flights called for them."""
-        return tuple(name for name in self._spare if name not in self.further_corrections)
+    def spare(self) -> tuple[str, ...]:
+        """Freedoms that the search has not, and would have if the flights called for them."""
+        return tuple(name for name in self._spare if name not in self.further)
 
-    def space_with(self, corrections: Sequence[str]) -> SearchSpace:
-        """The search space as it is by now, and with further corrections searched."""
-        if not corrections:
-            return self.space
-        wide = search_space(
-            self.model,
-            separate_wings=self.settings.separate_wings,
-            aero_coefficients=(*self.space.free_aero, *corrections),
-            bounds=self._bounds,
+    def space_with(self, freedoms: Sequence[str]) -> SearchSpace:
+        """The search space as it is by now, and with further freedoms."""
+        wide = self._space_of((*self.further, *freedoms))
+        at = sources(self.space, wide)
+        lower, upper = (
+            np.where(at < 0, own, now[at])
+            for own, now in ((wide.lower, self.space.lower), (wide.upper, self.space.upper))
         )
-        lower, upper = wide.lower.copy(), wide.upper.copy()
-        at = [wide.names.index(name) for name in self.space.names]
-        lower[at], upper[at] = self.space.lower, self.space.upper
         return wide.widened(Box(lower, upper))
 
     def shapes(self) -> list[tuple[int, int]]:
@@ -308,13 +310,13 @@ class Identification:
             self._step_s = state.prepared.step_s if self._step_s is None else self._step_s
             if self._round != state.prepared.round:
                 self.openness, self._round = state.prepared.openness, state.prepared.round
-            if self.further_corrections != state.prepared.corrections:
-                self._begin(state.prepared.corrections)
+            if self.further != state.prepared.further:
+                self._begin(state.prepared.further)
         self.space, self.prior_weight = self._first_space, PRIOR_RAD**2
         if isinstance(state.solver, LeastSquaresState | HybridState):
             own = state.solver if isinstance(state.solver, LeastSquaresState) else state.solver.descent
             self.prior_weight = float(own.best_weight.max())
-            # the descent before a review that has freed corrections was in a smaller space
+            # the descent before a review that has freed something was in a smaller space
             if own.box.lower.size == self.space.dimension:
                 self.space = self._first_space.widened(own.box)
         return state

@@ -14,7 +14,9 @@ from morphcore.models.equivalent import ChainModel, ParameterBatch, fitted, phys
 from morphcore.models.parameters import CutSurface, Parameter
 from morphcore.models.transforms import Transform
 from morphcore.search.solver import Box
+from morphdata.faults import refuse
 from morphdata.identify import Bounds
+from morphdata.links import LinksPerWing, by_pair
 from morphdata.renamed import current_name, current_names
 
 Array = NDArray[np.float64]
@@ -33,13 +35,13 @@ class Unknown:
     parameter : Parameter
         Its kind.
     links : int
-        Links per wing.
+        Of the surfaces that have it.
     prefix : str
         Of its names; "" where there is no other of its kind.
     sets : tuple of int
-        Sets of a batch that have it; none of the aircraft's.
+        Sets of a batch that have it, or columns of the lift factor; none where the aircraft has one.
     surfaces : tuple of int
-        Indices of the surfaces that have it; none of the aircraft's.
+        Indices of the surfaces that have it; none where the aircraft has one.
     transform : Transform
         How it is searched.
     lower, upper, guess : ndarray, shape (d,)
@@ -77,8 +79,9 @@ class Unknown:
 
     def of(self, batch: ParameterBatch) -> Array:
         """Its values (p, m) in a batch."""
-        values = batch[self.parameter.name]
-        return (values[:, self.sets[0]] if self.sets else values).reshape(batch.particles, -1)
+        name = self.parameter.name
+        values = batch.of_set(name, self.sets[0]) if self.sets else batch[name]
+        return values.reshape(batch.particles, -1)
 
 
 @dataclass(frozen=True)
@@ -147,7 +150,7 @@ class SearchSpace:
         return int(self.guess.size)
 
     @property
-    def links(self) -> int:
+    def links(self) -> LinksPerWing:
         """Links per wing."""
         return self.model.links_per_wing
 
@@ -163,15 +166,14 @@ class SearchSpace:
         """Parameters of search points (p, d)."""
         x = np.atleast_2d(x)
         values = {name: np.repeat(value, x.shape[0], axis=0) for name, value in self.fixed.values.items()}
+        batch = replace(self.fixed, values=values)
         for unknown, at, _ in self._parts():
             if unknown.searched:
-                found, out = unknown.transform.inverse(x[:, at]), values[unknown.parameter.name]
-                if unknown.sets:
-                    for k in unknown.sets:
-                        out[:, k] = found.reshape(out[:, k].shape)
-                else:
+                found, name = unknown.transform.inverse(x[:, at]), unknown.parameter.name
+                places = [batch.of_set(name, k) for k in unknown.sets] or [values[name]]
+                for out in places:
                     out[:] = found.reshape(out.shape)
-        return ParameterBatch(values, self.fixed.surfaces)
+        return batch
 
     def encode(self, batch: ParameterBatch) -> Array:
         """The search point (d,) of a model (one particle), moved into the bounds.
@@ -184,12 +186,6 @@ class SearchSpace:
             It has other links than are searched, wings of their own where mirror images are searched alike,
             or other surfaces.
         """
-        if batch.links != self.links:
-            raise InvalidInput(
-                f"the search is for {self.links} links per wing, the model to begin from has {batch.links}",
-                pointer=WARM_START,
-                hint=f"begin from a model with {self.links}, or set model.links_per_wing to {batch.links}",
-            )
         try:
             batch = fitted(self.model, batch)
         except InvalidInput as error:
@@ -197,10 +193,14 @@ class SearchSpace:
         chosen = self.model.set_of(batch)
         x = self.guess.copy()
         for unknown, at, _ in self._parts():
-            if not unknown.searched or unknown.parameter.name not in batch.values:
+            name = unknown.parameter.name
+            if not unknown.searched or name not in batch.values:
                 continue
-            values = batch[unknown.parameter.name]
-            if unknown.sets:
+            if unknown.parameter.scope == "aircraft":
+                reference = self.model.aircraft.surfaces.index(self.model.reference_surface)
+                number = unknown.surfaces[0] if unknown.surfaces else reference
+                values = batch.of_aircraft(name, self.model.own_column(batch, number))
+            else:
                 given = {chosen[k] for k in unknown.surfaces}
                 if len(given) > 1 and unknown.parameter.scope == "surface":
                     raise InvalidInput(
@@ -208,7 +208,7 @@ class SearchSpace:
                         pointer=WARM_START,
                         hint="set model.separate_wings, or begin from a model whose wings are alike",
                     )
-                values = values[0, min(given)]
+                values = batch.of_set(name, min(given))[0]
             x[at] = unknown.transform.forward(values.reshape(-1))
         return np.asarray(np.clip(x, self.lower, self.upper))
 
@@ -282,15 +282,6 @@ class SearchSpace:
         near = BOUND_TOLERANCE * (self.upper - self.lower)
         return np.flatnonzero((x <= self.lower + near) | (x >= self.upper - near))
 
-    def coordinates_of(self, parameter: str) -> NDArray[np.int64]:
-        """Indices of the search coordinates of a parameter, of all surfaces."""
-        found = [
-            np.arange(at.start, at.stop)
-            for unknown, at, _ in self._parts()
-            if unknown.parameter.name == parameter
-        ]
-        return np.concatenate([np.zeros(0, dtype=np.int64), *found])
-
     def named(self, chosen: NDArray[np.bool_]) -> tuple[str, ...]:
         """Named parameters of some search coordinates (d,); a share of the span stands for its ratio."""
         return tuple(
@@ -312,6 +303,7 @@ def search_space(
     separate_wings: bool = False,
     aero_coefficients: Sequence[str] | None = None,
     bounds: Mapping[str, Sequence[float]] | None = None,
+    own_lift: Sequence[str] | None = (),
 ) -> SearchSpace:
     """The unknowns of a model, bounded around beam and thin-airfoil theory.
 
@@ -324,11 +316,13 @@ def search_space(
         The corrections to search; None: all, those on request only if they have bounds.
     bounds : mapping of str to (float, float), optional
         Low and high in SI units, by the name of a parameter, in the place of its own.
+    own_lift : sequence of str, optional
+        Surfaces that have a lift factor of their own, the others share one; None: all have.
 
     Raises
     ------
     InvalidInput
-        A bound is unknown, empty, of the wrong sign or absurdly wide, or a correction is unknown.
+        A surface or bound is unknown, empty, of the wrong sign or absurdly wide, or a correction is unknown.
     """
     given_bounds = Bounds.parse(
         {name: list(pair) for name, pair in (bounds or {}).items()}, "/model/bounds"
@@ -347,20 +341,43 @@ def search_space(
         else current_names(aero_coefficients)
     )
     free = tuple(name for name in corrections if name in chosen)
-    fixed = physical_guess(model, separate_wings=separate_wings)
+    apart = own_lift_of(model, own_lift) if "lift_factor" in free else ()
+    fixed = physical_guess(model, separate_wings=separate_wings, apart=apart)
     unknowns = []
     for parameter in model.parameters:
-        for prefix, surfaces in _owners(model, parameter, separate_wings=separate_wings):
+        owners = _owners(model, parameter, apart, separate_wings=separate_wings)
+        for column, (prefix, surfaces) in enumerate(owners):
             searched = parameter.name in free or not parameter.correction
             given = given_bounds.get(parameter.name) if searched else None
-            unknowns.append(_unknown(model, fixed, parameter, prefix, surfaces, given, searched=searched))
+            sets = _sets(model, fixed, parameter, column, surfaces)
+            unknowns.append(
+                _unknown(model, fixed, (parameter, prefix, sets, surfaces), given, searched=searched)
+            )
     return SearchSpace(model=model, unknowns=tuple(unknowns), free_aero=free, fixed=fixed)
 
 
+def own_lift_of(model: ChainModel, names: Sequence[str] | None) -> tuple[str, ...]:
+    """Keys of `ChainModel.unlike` whose lift factor is searched apart; None stands for all.
+
+    The largest of all has the one without a name.
+    """
+    keys = tuple(model.unlike)
+    if names is None:
+        return keys[1:]
+    surfaces = [surface.name for surface in model.aircraft.surfaces]
+    pairs = [*model.unlike.values()]
+    found, faults = by_pair(dict.fromkeys(names, True), surfaces, pairs, "/model/own_lift")
+    refuse(faults)
+    return keys[1:] if len(found) == len(keys) else tuple(keys[number] for number in sorted(found))
+
+
 def _owners(
-    model: ChainModel, parameter: Parameter, *, separate_wings: bool
+    model: ChainModel, parameter: Parameter, apart: Sequence[str], *, separate_wings: bool
 ) -> list[tuple[str, tuple[int, ...]]]:
     """Who has values of a parameter of its own: prefix of the names, and indices of the surfaces."""
+    if parameter.apart and apart:
+        shared = tuple(k for key, pair in model.unlike.items() if key not in apart for k in pair)
+        return [("", shared), *((f"{key}.", model.unlike[key]) for key in apart)]
     if parameter.scope == "aircraft":
         return [("", ())]
     separate = separate_wings and parameter.scope == "surface"
@@ -372,21 +389,28 @@ def _owners(
     return [(f"{model.label(group)}.", group) for group in groups]
 
 
+def _sets(
+    model: ChainModel, fixed: ParameterBatch, parameter: Parameter, column: int, surfaces: tuple[int, ...]
+) -> tuple[int, ...]:
+    """Sets of a batch, or columns of its lift factor, that an owner has."""
+    if parameter.scope == "aircraft":
+        return (column,) if surfaces else ()
+    chosen = model.set_of(fixed)
+    return tuple(sorted({chosen[k] for k in surfaces}))
+
+
 def _unknown(
     model: ChainModel,
     fixed: ParameterBatch,
-    parameter: Parameter,
-    prefix: str,
-    surfaces: tuple[int, ...],
+    owned: tuple[Parameter, str, tuple[int, ...], tuple[int, ...]],
     bounds: Sequence[float] | None,
     *,
     searched: bool,
 ) -> Unknown:
-    chosen = model.set_of(fixed)
-    sets = tuple(sorted({chosen[k] for k in surfaces}))
+    parameter, prefix, sets, surfaces = owned
     surface = model.aircraft.surfaces[surfaces[0]] if surfaces else model.reference_surface
-    values = fixed[parameter.name]
-    values = (values[0, sets[0]] if sets else values[0]).reshape(-1)
+    own = 0 if parameter.scope == "aircraft" else sets[0]
+    values = (fixed.of_set(parameter.name, sets[0]) if sets else fixed[parameter.name])[0].reshape(-1)
     transform = parameter.transform(surface)
     lower = upper = np.zeros(0)
     limits = (lower, upper)
@@ -394,16 +418,15 @@ def _unknown(
         low, high = bounds
         lower, upper = limits = transform.box(low, high, values.size)
     elif searched:
-        cut = CutSurface(surface, model.flight, fixed["division"][:, sets[0] if sets else 0])
+        cut = CutSurface(surface, model.flight, fixed.of_set("division", own))
         lower, upper = parameter.bounds(cut)
         limits = _limits(parameter, cut, lower, upper)
     guess = transform.forward(values) if lower.size else lower
     # no damping at all has no logarithm: its search begins in the middle
     guess = np.where(np.isfinite(guess), guess, 0.5 * (lower + upper))
     guess = np.clip(guess, lower, upper)
-    return Unknown(
-        parameter, model.links_per_wing, prefix, sets, surfaces, transform, lower, upper, guess, limits
-    )
+    links = fixed.of_set("division", own).shape[1]
+    return Unknown(parameter, links, prefix, sets, surfaces, transform, lower, upper, guess, limits)
 
 
 def _limits(parameter: Parameter, cut: CutSurface, lower: Array, upper: Array) -> tuple[Array, Array]:

@@ -28,6 +28,7 @@ from morphcore.search.run import SearchState
 from morphcore.shown import Shown, Summary
 from morphcore.validity import ResultWarning, documents
 from morphdata.identify import EquivalentModel
+from morphdata.links import shown_per_wing
 from morphdata.measurement import ANGLES
 from morphdata.renamed import both_spellings, under_both_spellings
 
@@ -152,7 +153,7 @@ class IdentifyResult(Shown):
         angles = [f"rms {angle}, mrad" for angle in ANGLES]
         documents = [fit.to_document() for fit in self.fits]
         return Summary(
-            f"IdentifyResult: {self.parameters.links} links per wing",
+            f"IdentifyResult: {shown_per_wing(self.parameters.links_per_wing)}",
             {
                 **{
                     f"{parameter.name}, {parameter.unit}": self.parameters[parameter.name]
@@ -208,7 +209,11 @@ def identify_result(run: Identification, state: SearchState, *, judged: bool = T
         search=_search_document(run, state),
         cost=_flight_times(run, rigid, best, judged=judged),
         settings=run.settings.model_copy(
-            update={"step_s": run.step_s, "aero_coefficients": list(space.free_aero)}
+            update={
+                "step_s": run.step_s,
+                "aero_coefficients": list(space.free_aero),
+                "own_lift": list(space.fixed.apart),
+            }
         ),
         warnings=fit_warnings(
             run,
@@ -242,6 +247,7 @@ def _search_document(run: Identification, state: SearchState) -> dict[str, Any]:
     """Method, effort and history of the search."""
     return {
         "aero_coefficients": both_spellings(run.space.free_aero),
+        "own_lift": list(run.space.fixed.apart),
         "method": run.search.method,
         "seed": run.search.seed,
         "prior_rad": float(np.sqrt(run.prior_weight)),

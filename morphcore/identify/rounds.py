@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from morphcore.identify.cost import DIVERGED_ANGLE, SampleCase, reduced_errors, shared_trims
 from morphcore.identify.descents import descent
-from morphcore.identify.free_corrections import likelier_corrections
+from morphcore.identify.free_corrections import called_for, moved
 from morphcore.identify.free_start import free_parts
 from morphcore.identify.measurement import (
     FLOOR,
@@ -38,7 +38,6 @@ from morphdata.measurement import ANGLES
 
 if TYPE_CHECKING:
     from morphcore.identify.identification import Identification
-    from morphcore.identify.parameters import SearchSpace
 
 Array = NDArray[np.float64]
 
@@ -68,14 +67,14 @@ class Prepared:
         Of each sample.
     round : int
         Descents before this one.
-    corrections : tuple of str
-        Corrections that are searched because the flights call for them.
+    further : tuple of str
+        Freedoms of the search that the flights call for (`free_corrections`).
     """
 
     step_s: float
     openness: tuple[Openness, ...] = ()
     round: int = 0
-    corrections: tuple[str, ...] = ()
+    further: tuple[str, ...] = ()
 
 
 def reviewed(run: Identification, state: SearchState, stop: Stop | None = None) -> SearchState | None:
@@ -97,16 +96,19 @@ def reviewed(run: Identification, state: SearchState, stop: Stop | None = None) 
     if not (run.space.dimension and np.isfinite(state.best_cost)):
         return None
     found = next_openness(run, state.best)
-    further = likelier_corrections(run, state.best) if found is None else ()
+    further = called_for(run, state.best) if found is None else ()
     if found is None and not further:
         return None
     found = found or run.openness
     freed = bool(further) or any(a.reason != b.reason for a, b in zip(found, run.openness, strict=True))
     space, best = run.space_with(further), state.best
     if further:
-        best = _moved(run, space, best)
-        found = tuple(replace(each, reference=_moved(run, space, each.reference)) for each in found)
-    prepared = Prepared(run.step_s, found, number + 1, (*run.further_corrections, *further))
+        best = moved(run.space, space, best)
+        found = tuple(
+            replace(each, reference=moved(run.space, space, each.reference)) if each.reference.size else each
+            for each in found
+        )
+    prepared = Prepared(run.step_s, found, number + 1, (*run.further, *further))
     run.entered(replace(state, prepared=prepared))
     run.space = space
     # with other unknowns the best model may lie in another valley
@@ -135,11 +137,6 @@ def reviewed(run: Identification, state: SearchState, stop: Stop | None = None) 
         history=(*state.history, row),
         over=False,
     )
-
-
-def _moved(run: Identification, space: SearchSpace, point: Array) -> Array:
-    """A point of the present search space in another one; an empty one stays."""
-    return space.encode(run.space.decode(point)) if point.size else point
 
 
 def next_openness(run: Identification, best: Array) -> tuple[Openness, ...] | None:

@@ -30,6 +30,7 @@ from morphcore.threads import one_blas_thread, use_threads
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.flight import Flight as FlightDocument
 from morphdata.identify import EquivalentModel, Search, SearchedModel
+from morphdata.links import LinksPerWing, shown_links
 from morphdata.measurement import Measurement
 from morphdata.renamed import both_spellings
 from morphdata.study import StudiedModels, StudyRequest
@@ -59,7 +60,7 @@ class Study:
         flight: Flight,
         samples: Sequence[Trajectory],
         *,
-        links: Sequence[int] = LINKS,
+        links: Sequence[LinksPerWing] = LINKS,
         model: SearchedModel | None = None,
         search: SearchSettings | None = None,
         measurement: Measurement | None = None,
@@ -142,7 +143,7 @@ class Study:
             generation=state.generation + 1,
             flights=done + step.flights,
         )
-        return moved, replace(step, message=f"{_links(links)}: {step.message}")
+        return moved, replace(step, message=f"{shown_links(links)}: {step.message}")
 
     def _judge(self, state: StudyState) -> tuple[StudyState, Step]:
         """The result of an identification that came to its end."""
@@ -156,7 +157,7 @@ class Study:
             share=0.0,
             budget_s=None,
         )
-        return moved, self._reported("result", state, f"{_links(row.links_per_wing)}: {_found(row)}")
+        return moved, self._reported("result", state, f"{shown_links(row.links_per_wing)}: {_found(row)}")
 
     def _time(self, state: StudyState, stop: Stop | None) -> tuple[StudyState, Step]:
         """One round of single flights of all models."""
@@ -260,7 +261,7 @@ def study(
     flight: FlightDocument,
     samples: Sequence[Trajectory],
     *,
-    links: Sequence[int] = LINKS,
+    links: Sequence[LinksPerWing] = LINKS,
     model: SearchedModel | None = None,
     search: Search | None = None,
     measurement: Measurement | None = None,
@@ -276,8 +277,8 @@ def study(
     samples : sequence of Trajectory
         Sample flights, angles in rad; those with role "held_out" are not fitted, and decide what is
         recommended.
-    links : sequence of int
-        Numbers of links per wing.
+    links : sequence of int or mapping of str to int
+        Numbers of links per wing, each of all flexible surfaces or by name.
     model : SearchedModel, optional
         What the models have in common: bounds, lattice, time step.
     search : Search, optional
@@ -336,14 +337,10 @@ def study_from_request(request: StudyRequest, threads: int | None = None) -> Stu
     )
 
 
-def _of_links(model: SearchedModel, links: int) -> EquivalentModel:
+def _of_links(model: SearchedModel, links: LinksPerWing) -> EquivalentModel:
     return EquivalentModel(**{**dict(model), "links_per_wing": links})
 
 
 def _found(row: StudyRow) -> str:
     J = "diverged" if row.J_train is None else f"J = {row.J_train:.3g} rad^2"
     return J if row.J_held_out is None else f"{J}, {row.J_held_out:.3g} on the flights held out"
-
-
-def _links(count: int) -> str:
-    return f"{count} link{'s' if count != 1 else ''}"

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from morphcore.identify.study_row import Role, StudyRow
+from morphdata.links import LinksPerWing, shown_links, shown_per_wing
 
 WORTH_OF_A_LINK = 2.0  # factor in the error
 # RMS of any attitude angle; the step of 10 ms holds attitude to within this (simulate/time_grid.py)
@@ -31,7 +32,7 @@ class Recommendation:
     judged_by : the role of the flights on which the models were compared.
     """
 
-    links_per_wing: int | None
+    links_per_wing: LinksPerWing | None
     reason: str
     judged_by: Role
 
@@ -45,12 +46,12 @@ def recommend(rows: Sequence[StudyRow]) -> Recommendation:
     role: Role = "held_out" if any(row.has_held_out for row in rows) else "train"
     flown = sorted(
         (row for row in rows if row.finished and row.flown and row.J(role) is not None),
-        key=lambda row: row.links_per_wing,
+        key=lambda row: row.mean_links,
     )
     if not flown:
         what = "was identified to the end" if not any(row.finished for row in rows) else "flew every flight"
         return Recommendation(None, f"No model {what}.", role)
-    cheapest = min(flown, key=lambda row: _error(row, role) * WORTH_OF_A_LINK**row.links_per_wing)
+    cheapest = min(flown, key=lambda row: _error(row, role) * WORTH_OF_A_LINK**row.mean_links)
     chosen = next(row for row in flown if row is cheapest or _is_resolved(row))
     return Recommendation(chosen.links_per_wing, _reason(chosen, flown, role), role)
 
@@ -66,14 +67,14 @@ def _is_resolved(row: StudyRow) -> bool:
 
 def _reason(chosen: StudyRow, flown: Sequence[StudyRow], role: Role) -> str:
     """The sentences, with the figures that they rest on."""
-    n = chosen.links_per_wing
+    n = chosen.mean_links
     flights = "the flights held out" if role == "held_out" else "the fitted flights, for none was held out"
-    said = f"{_links(n)} per wing: J = {chosen.J(role):.2g} rad^2 on {flights}"
+    said = f"{shown_per_wing(chosen.links_per_wing)}: J = {chosen.J(role):.2g} rad^2 on {flights}"
     if chosen.worst_rms_rad is not None:
         said += f", RMS up to {1e3 * chosen.worst_rms_rad:.2g} mrad in an angle"
     others = [
-        *_compared("the best with fewer,", [row for row in flown if row.links_per_wing < n], chosen, role),
-        *_compared("the best with more,", [row for row in flown if row.links_per_wing > n], chosen, role),
+        *_compared("the best with fewer,", [row for row in flown if row.mean_links < n], chosen, role),
+        *_compared("the best with more,", [row for row in flown if row.mean_links > n], chosen, role),
     ]
     sentences = [said, "; ".join(others)] if others else [said]
     if _is_resolved(chosen):
@@ -90,7 +91,7 @@ def _compared(label: str, rows: Sequence[StudyRow], chosen: StudyRow, role: Role
         return []
     best = min(rows, key=lambda row: _error(row, role))
     own, other = _error(chosen, role), _error(best, role)
-    said = f"{label} {_links(best.links_per_wing)}, "
+    said = f"{label} {shown_links(best.links_per_wing)}, "
     said += (
         f"has {_two_digits(other / own)} times the error" if own > 0.0 else "has an error; this one has none"
     )
@@ -102,16 +103,12 @@ def _compared(label: str, rows: Sequence[StudyRow], chosen: StudyRow, role: Role
 def _overfitted(chosen: StudyRow, flown: Sequence[StudyRow]) -> list[str]:
     """Where larger models fit better and predict worse, say from which on."""
     for row in flown:
-        if row.links_per_wing > chosen.links_per_wing and row.has_held_out:
+        if row.mean_links > chosen.mean_links and row.has_held_out:
             fits_better = _error(row, "train") < _error(chosen, "train")
             if fits_better and _error(row, "held_out") > _error(chosen, "held_out"):
-                return [f"With {_links(row.links_per_wing)} the fit is better and the prediction worse"]
+                return [f"With {shown_links(row.links_per_wing)} the fit is better and the prediction worse"]
     return []
 
 
 def _two_digits(ratio: float) -> str:
     return f"{float(f'{ratio:.2g}'):g}"  # 110, not 1.1e+02
-
-
-def _links(count: int) -> str:
-    return f"{count} link{'s' if count != 1 else ''}"

@@ -10,6 +10,7 @@ from morphcore.identify.study_choice import Recommendation, recommend
 from morphcore.identify.study_row import Document, StudyRow
 from morphcore.identify.study_timing import FLIGHT_S
 from morphcore.shown import Shown, Summary
+from morphdata.links import LinksPerWing, shown_links
 
 TIMING_THREADS = 1  # see FlightTiming.round
 
@@ -29,19 +30,19 @@ class StudyResult(Shown):
     search: Document
     cost: Document
 
-    def row(self, links_per_wing: int) -> StudyRow:
+    def row(self, links_per_wing: LinksPerWing) -> StudyRow:
         """The row of one number of links."""
         return next(row for row in self.rows if row.links_per_wing == links_per_wing)
 
     def summary(self) -> Summary:
         """Accuracy and cost of each number of links, and which to take."""
         return Summary(
-            f"StudyResult: {len(self.rows)} models, recommended: {self.recommended.links_per_wing} links",
+            f"StudyResult: {len(self.rows)} models, recommended: {_links(self.recommended.links_per_wing)}",
             {"rigid J, rad^2": self.rigid["J_train"], "rigid J held out": self.rigid["J_held_out"]},
             ("links", "J train, rad^2", "J held out", "flight, ms"),
             [
                 [
-                    row.links_per_wing,
+                    shown_links(row.links_per_wing),
                     row.J_train,
                     row.J_held_out,
                     None if row.flight_s is None else 1e3 * row.flight_s,
@@ -76,6 +77,10 @@ class StudyResult(Shown):
         }
 
 
+def _links(links: LinksPerWing | None) -> str:
+    return "none" if links is None else shown_links(links)
+
+
 def study_result(
     rows: tuple[StudyRow, ...],
     *,
@@ -85,7 +90,7 @@ def study_result(
     search: Document,
 ) -> StudyResult:
     """Put a study's rows together and recommend one."""
-    ordered = tuple(sorted(rows, key=lambda row: row.links_per_wing))
+    ordered = tuple(sorted(rows, key=lambda row: row.mean_links))
     first = ordered[0] if ordered else None
     return StudyResult(
         rows=ordered,

@@ -14,6 +14,7 @@ from morphcore.models.equivalent import ParameterBatch
 from morphcore.models.parameters_document import parameters_from_document
 from morphcore.search.checkpoint import stored
 from morphcore.shown import Shown
+from morphdata.links import LinksPerWing, mean_links, shown_per_wing
 from morphdata.measurement import ANGLES
 
 Document = dict[str, Any]
@@ -36,7 +37,7 @@ class StudyRow(Shown):
     samples to fit. finished : whether the search went to its end.
     """
 
-    links_per_wing: int
+    links_per_wing: LinksPerWing
     bodies: int
     parameters: int
     J_train: float | None
@@ -53,6 +54,11 @@ class StudyRow(Shown):
     warnings: list[Document] = field(default_factory=list)
     verdict: Document | None = None
     measurement: Document = field(default_factory=dict)
+
+    @property
+    def mean_links(self) -> float:
+        """Mean number of links, where they differ."""
+        return mean_links(self.links_per_wing)
 
     def J(self, role: Role) -> float | None:
         """J over the flights of a role, rad^2."""
@@ -88,7 +94,7 @@ class StudyRow(Shown):
         """
         if self.model is None:
             raise NotFlyable(
-                f"no model of {self.links_per_wing} links per wing flew the samples",
+                f"no model of {shown_per_wing(self.links_per_wing)} flew the samples",
                 pointer="/model/links_per_wing",
                 hint="take the row of another number of links",
             )

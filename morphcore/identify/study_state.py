@@ -7,6 +7,7 @@ from typing import Literal
 
 from morphcore.identify.study_row import StudyRow
 from morphcore.search.checkpoint import UnreadableCheckpoint, pack, stored, unpack
+from morphdata.links import LinksPerWing
 
 Phase = Literal["search", "result", "timing", "done"]
 
@@ -26,7 +27,7 @@ class StudyState:
     """
 
     phase: Phase
-    links: tuple[int, ...]
+    links: tuple[LinksPerWing, ...]
     rows: tuple[StudyRow, ...] = ()
     search: bytes | None = None
     share: float = 0.0
@@ -44,7 +45,7 @@ def encode(state: StudyState) -> bytes:
     return pack(state, VERSION)
 
 
-def decode(checkpoint: bytes, links: tuple[int, ...]) -> StudyState:
+def decode(checkpoint: bytes, links: tuple[LinksPerWing, ...]) -> StudyState:
     """Return the state that `encode` wrote for a study of these numbers of links.
 
     Raises

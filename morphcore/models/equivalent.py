@@ -20,6 +20,7 @@ from morphcore.geometry.mirror import Mirror, mirror_groups, mirror_of
 from morphcore.geometry.obstacle import lift_coefficient
 from morphcore.geometry.surface import Surface
 from morphcore.lanes import lane_width
+from morphcore.models.guess import fitted, physical_guess
 from morphcore.models.kernels.layout import (
     FORCE_C,
     LINKS_C,
@@ -27,13 +28,34 @@ from morphcore.models.kernels.layout import (
     axis_rows_of_scratch,
     state_rows,
 )
-from morphcore.models.links import beam_division, link_edges
+from morphcore.models.links import link_edges
+from morphcore.models.parameter_batch import ParameterBatch
 from morphcore.models.parameters import CHAIN_PARAMETERS, CutSurface, Parameter, SurfaceRows
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
+from morphdata.faults import refuse
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
-from morphdata.parameters import MAX_LINKS
-from morphdata.renamed import RENAMED, current_name
+from morphdata.links import (
+    MAX_LINKS,
+    LinksPerWing,
+    common_names,
+    links_document,
+    links_of,
+    means,
+)
+from morphdata.refusals import escaped
+
+__all__ = [
+    "ChainModel",
+    "LaneConstants",
+    "ParameterBatch",
+    "chain_model",
+    "fitted",
+    "from_lanes",
+    "lane_constants",
+    "physical_guess",
+    "to_lanes",
+]
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -45,71 +67,10 @@ FINE_LINKS = 8  # of a chain that stands for the beams: its nominal tip deflects
 
 
 @dataclass(frozen=True, repr=False)
-class ParameterBatch(Shown):
-    """Parameters of a batch of equivalent models of one aircraft (p particles, w sets, n links).
-
-    Attributes
-    ----------
-    values : mapping of str to ndarray
-        Keyed by the names of ``CHAIN_PARAMETERS``. Each set has ``division`` (p, w, n), shares of the span
-        that sum to one; ``stiffness_nm_rad`` and ``damping_nms_rad`` (p, w, n - 1, 3) of flap, torsion and
-        edgewise; ``profile_drag`` (p, w). The aircraft has ``lift_factor``, ``ac_offset_m`` (forward
-        positive) and ``lag_s`` (p,): values of its largest surface; other surfaces scale them with their
-        chords.
-    surfaces : tuple of tuples of str, optional
-        Names of the surfaces of each set. None: a single set belongs to all flexible surfaces, which form one
-        mirror pair; several sets belong to the flexible surfaces in the aircraft's order.
-    """
-
-    values: Mapping[str, Array]
-    surfaces: tuple[tuple[str, ...], ...] | None = None
-
-    def __post_init__(self) -> None:
-        if any(name in RENAMED for name in self.values):
-            current = {current_name(name): value for name, value in self.values.items()}
-            object.__setattr__(self, "values", current)
-
-    def __getitem__(self, name: str) -> Array:
-        """The values of one parameter; its former name is also accepted."""
-        return self.values[current_name(name)]
-
-    @property
-    def particles(self) -> int:
-        """Number of parameter sets."""
-        return int(self["division"].shape[0])
-
-    @property
-    def sets(self) -> int:
-        """Number of sets of surface values, w."""
-        return int(self["division"].shape[1])
-
-    @property
-    def links(self) -> int:
-        """Links per flexible surface."""
-        return int(self["division"].shape[2])
-
-    def select(self, index: NDArray[np.int64] | slice) -> ParameterBatch:
-        """Return a subset of the particles."""
-        return replace(self, values={name: value[index] for name, value in self.values.items()})
-
-    def changed(self, **values: Array) -> ParameterBatch:
-        """Return a copy with other values of some parameters.
-
-        Raises
-        ------
-        KeyError
-            A name is not one of its parameters.
-        """
-        values = {current_name(name): value for name, value in values.items()}
-        if not values.keys() <= self.values.keys():
-            raise KeyError(f"got {', '.join(values)}, but the parameters are {', '.join(self.values)}")
-        return replace(self, values={**self.values, **values})
-
-
-@dataclass(frozen=True, repr=False)
 class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
+    links_per_wing : links of each flexible surface, by name where they differ.
     surfaces : (s, 11) first link, links, first strip, strips, first overlap pair of each surface; whether it
         also represents its mirror image; the first of its further outputs of the lattice (or -1); its
         `AircraftLattice.control_inputs`; whether it carries point masses.
@@ -118,7 +79,7 @@ class ChainModel(Shown):
     aircraft: Aircraft
     flight: Flight
     lattice: AircraftLattice
-    links_per_wing: int
+    links_per_wing: LinksPerWing
     surfaces: IntArray
 
     @cached_property
@@ -137,8 +98,10 @@ class ChainModel(Shown):
         every = self.aircraft.surfaces
         own = replace(self.aircraft, surfaces=tuple(every[k] for k in self.mirror.own))
         images = tuple(every[k] for k in self.mirror.image)
+        counts = self.surfaces[list(self.mirror.own), 1]
+        lattice = self.lattice
         return _chain_model(
-            own, self.flight, self.links_per_wing, self.lattice.settings, images, self.lattice.steep
+            own, self.flight, self.links_per_wing, counts, lattice.settings, images, lattice.steep
         )
 
     @cached_property
@@ -146,15 +109,19 @@ class ChainModel(Shown):
         """The rigid model of the same aircraft (or half of one) in the same flight."""
         if self.links_per_wing == 1:
             return self
-        lattice = self.lattice
-        return _chain_model(self.aircraft, self.flight, 1, lattice.settings, lattice.images, lattice.steep)
+        return self._with_links(1)
 
     @cached_property
     def fine(self) -> ChainModel:
         """A chain of the same aircraft whose nominal parameters represent the beams: it bends as they do."""
+        return self._with_links(FINE_LINKS)
+
+    def _with_links(self, links: int) -> ChainModel:
+        """The same aircraft (or half of one) with a number of links for each flexible surface."""
+        counts = [links if surface.flexible else 1 for surface in self.aircraft.surfaces]
         lattice = self.lattice
         return _chain_model(
-            self.aircraft, self.flight, FINE_LINKS, lattice.settings, lattice.images, lattice.steep
+            self.aircraft, self.flight, links, counts, lattice.settings, lattice.images, lattice.steep
         )
 
     @cached_property
@@ -212,6 +179,32 @@ class ChainModel(Shown):
         """
         groups = mirror_groups([self.aircraft.surfaces[k] for k in self.flexible])
         return tuple(sorted((tuple(self.flexible[k] for k in group) for group in groups), key=self._rank))
+
+    @cached_property
+    def unlike(self) -> dict[str, tuple[int, ...]]:
+        """Mirror pairs of all surfaces, rigid ones too, by a name for both; the largest comes first."""
+        surfaces = self.aircraft.surfaces
+        groups = sorted(mirror_groups(surfaces), key=self._rank)
+        reference = surfaces.index(self.reference_surface)
+        groups.sort(key=lambda group: reference not in group)
+        return dict(zip(common_names([surface.name for surface in surfaces], groups), groups, strict=True))
+
+    def own_column(self, batch: ParameterBatch, number: int) -> int:
+        """Column of a batch's lift factors that a surface has: that of its own, or the first."""
+        if not batch.apart:
+            return 0
+        surfaces, images = self.aircraft.surfaces, self.lattice.images
+        names = [surface.name for surface in (*surfaces, *images)]
+        mine = {*next(pair for pair in self.unlike.values() if number in pair)}
+        mine |= {len(surfaces) + number} if images else set()
+        found = [k for k, key in enumerate(batch.apart, 1) if mine & set(means(key, names))]
+        return found[0] if found else 0
+
+    def links_on(self, number: int) -> int:
+        """Links of a flexible surface; those asked for, if it is rigid and stands for all."""
+        if self.aircraft.surfaces[number].flexible or not isinstance(self.links_per_wing, int):
+            return int(self.surfaces[number, 1])
+        return self.links_per_wing
 
     def _rank(self, group: Sequence[int]) -> tuple[float, str]:
         return -self.aircraft.surfaces[group[0]].area_m2, self.label(group)
@@ -288,114 +281,74 @@ class ChainModel(Shown):
         for parameter in self.parameters:
             known = batch.values.get(parameter.name)
             if parameter.scope == "aircraft" and known is not None:
+                known = batch.of_aircraft(parameter.name, self.own_column(batch, number))
                 values[parameter.name] = known * parameter.in_proportion(surface, self.reference_surface)
             elif parameter.scope != "aircraft" and known is not None and surface.flexible:
-                values[parameter.name] = known[:, chosen]
+                values[parameter.name] = batch.of_set(parameter.name, chosen)
             else:
                 values[parameter.name] = parameter.guess(cut)
         return values
 
 
 def chain_model(
-    aircraft: Aircraft, flight: Flight, links_per_wing: int, lattice: Lattice = DEFAULT_LATTICE
+    aircraft: Aircraft, flight: Flight, links_per_wing: LinksPerWing, lattice: Lattice = DEFAULT_LATTICE
 ) -> ChainModel:
     """Build the equivalent model with 1 to 16 links on each flexible surface; 1 is the rigid model.
 
+    Parameters
+    ----------
+    aircraft : Aircraft
+    flight : Flight
+    links_per_wing : int or mapping of str to int
+        Of all flexible surfaces, or of each by name, mirror images by a name for both.
+    lattice : Lattice, optional
+
     Raises
     ------
-    InvalidInput : the number of links is out of range.
+    InvalidInput : a number of links is out of range, or a surface is not named or is unknown.
     """
-    links = whole_number(
-        links_per_wing, "links_per_wing", pointer="/model/links_per_wing", minimum=1, maximum=MAX_LINKS
-    )
+    pointer, by_name = "/model/links_per_wing", isinstance(links_per_wing, Mapping)
+    given = links_per_wing if isinstance(links_per_wing, Mapping) else {"": links_per_wing}
+    checked = {
+        name: whole_number(
+            links, f"links_per_wing of {name!r}" if name else "links_per_wing",
+            pointer=f"{pointer}/{escaped(name)}" if by_name else pointer, minimum=1, maximum=MAX_LINKS,
+        )
+        for name, links in given.items()
+    }  # fmt: skip
+    surfaces = aircraft.surfaces
+    names, flexible = [each.name for each in surfaces], [each.flexible for each in surfaces]
+    pairs = mirror_groups(surfaces)
+    links: LinksPerWing = checked if by_name else checked[""]
+    counts, faults = links_of(links, names, flexible, pairs, pointer)
+    refuse(faults)
     steep = lift_coefficient(aircraft, flight) > STEEP_LIFT
-    return _chain_model(aircraft, flight, links, lattice, steep=steep)
+    if by_name:
+        bent = [k for k, bends in enumerate(flexible) if bends]
+        links = links_document([names[k] for k in bent], [counts[k] for k in bent])
+    return _chain_model(aircraft, flight, links, counts, lattice, steep=steep)
 
 
 def _chain_model(
     aircraft: Aircraft,
     flight: Flight,
-    links_per_wing: int,
+    links_per_wing: LinksPerWing,
+    counts: Sequence[int] | IntArray,
     lattice: Lattice,
     images: Sequence[Surface] = (),
     steep: bool = False,  # noqa: FBT001, FBT002 - private
 ) -> ChainModel:
+    """A chain of so many links for each surface, as ``links_per_wing`` says in the form of documents."""
     lattices = aircraft_lattice(aircraft, lattice, images, steep=steep)
     rows, link, pair = [], 0, 0
-    for surface, part, strip0, controls in zip(
-        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control_inputs, strict=True
+    for surface, part, strip0, controls, count in zip(
+        aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control_inputs, counts, strict=True
     ):
-        count = links_per_wing if surface.flexible else 1
         more, lumped = lattices.more_rows(strip0), int(bool(surface.point_masses))
         rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more, *controls, lumped])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))
-
-
-def physical_guess(
-    model: ChainModel, division: Array | None = None, *, separate_wings: bool = False
-) -> ParameterBatch:
-    """Parameters from beam and thin-airfoil theory, with neutral corrections and Jones' lag.
-
-    Every flexible surface gets those of its own beam; mirror images share them unless wings are separate. For
-    division and stiffness, which represent the whole beam, see `beam_division` and `joint_stiffness`; damping
-    is proportional, c = beta k.
-
-    Parameters
-    ----------
-    model : ChainModel
-    division : ndarray, shape (p, w, n) or (p, 1, n), optional
-        Shares of the span for each set of `ChainModel.sets`, or the same for all; None: one particle with
-        those of `beam_division`.
-    separate_wings : bool
-        Whether each surface of a mirror pair has its own set.
-    """
-    sets = model.sets(separate_wings=separate_wings)
-    n = model.links_per_wing
-    bent = [model.aircraft.surfaces[group[0]] for group in sets]
-    shares = np.stack([beam_division(surface, n) for surface in bent])[None] if division is None else division
-    shares = np.broadcast_to(shares, (shares.shape[0], len(sets), n))
-    cuts = [CutSurface(surface, model.flight, shares[:, k]) for k, surface in enumerate(bent)]
-    reference = CutSurface(model.reference_surface, model.flight, shares[:, 0])
-    return ParameterBatch(
-        {
-            parameter.name: parameter.guess(reference)
-            if parameter.scope == "aircraft"
-            else np.stack([parameter.guess(cut) for cut in cuts], axis=1)
-            for parameter in model.parameters
-        },
-        model.set_names(sets),
-    )
-
-
-def fitted(model: ChainModel, batch: ParameterBatch) -> ParameterBatch:
-    """Return parameters with one set for each surface group of a model.
-
-    A single set given for an aircraft with several different flexible surfaces belongs to the largest. The
-    others deviate from their own beam theory by the same factors, and keep their own profile drag.
-
-    Raises
-    ------
-    InvalidInput
-        The batch belongs to another aircraft.
-    """
-    if batch.surfaces is None and batch.sets == 1 < len(model.pairs):
-        guess = physical_guess(model, batch["division"])
-        values = dict(batch.values)
-        for parameter in model.parameters:
-            known, own = batch.values.get(parameter.name), guess[parameter.name]
-            if known is None or parameter.scope == "aircraft":
-                continue
-            if parameter.factor:
-                with np.errstate(invalid="ignore", divide="ignore"):
-                    factor = np.where(own[:, 0] > 0.0, known[:, 0] / own[:, 0], 1.0)
-                own = own * factor[:, None]
-            values[parameter.name] = own.copy()
-            values[parameter.name][:, 0] = known[:, 0]
-        batch = ParameterBatch(values, guess.surfaces)
-    model.set_of(batch)
-    return batch
 
 
 @dataclass(frozen=True)

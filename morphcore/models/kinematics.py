@@ -72,7 +72,7 @@ def link_poses(
         r_B[:, first] = hinges[s, H_ORIGIN:]
         lengths = np.zeros((particles, 0))
         if surface.flexible:
-            edges = link_edges(batch["division"][:, chosen[s]], surface.length_m)
+            edges = link_edges(batch.of_set("division", chosen[s]), surface.length_m)
             lengths = surface.span_sign * np.diff(edges, axis=1)
         for k in range(1, count):
             link = first + k
@@ -99,7 +99,7 @@ def tip_positions(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joi
         last = int(model.surfaces[s, 0] + model.surfaces[s, 1]) - 1
         length = np.full(q_joint.shape[0], surface.length_m)
         if surface.flexible:
-            length = surface.length_m * batch["division"][:, chosen[s], -1]
+            length = surface.length_m * batch.of_set("division", chosen[s])[:, -1]
         tips[:, s] = (
             r_B[:, last] + R_BL[:, last, :, 1] * (surface.span_sign * length)[:, None] - hinges[s, H_ORIGIN:]
         )
@@ -133,6 +133,6 @@ def bent_shape(model: ChainModel, batch: ParameterBatch, q_joint: Array) -> Bent
         if row[1] == 1:
             shape.append(None)
             continue
-        edges = link_edges(batch["division"][:, chosen[number]], surface.length_m)[0]
+        edges = link_edges(batch.of_set("division", chosen[number]), surface.length_m)[0]
         shape.append(BentSurface(edges, R_WL[0, mine], r_W[0, mine], surface.span_sign))
     return tuple(shape)

@@ -184,6 +184,8 @@ class Parameter:
         Whether different surfaces share one set of it as factors on their own guesses.
     default : float, optional
         Value used if a document omits it; None: it is required, or `own_default`.
+    apart : bool
+        Whether unlike surfaces may have their own values of one of the aircraft.
     own_default : bool
         Whether a document may omit it, which leaves it at the surface's own guess.
     at_bound : mapping of str to str
@@ -204,6 +206,7 @@ class Parameter:
     asymmetric: bool = False
     on_request: bool = False
     factor: bool = False
+    apart: bool = False
     limits: Callable[[CutSurface], tuple[Array, Array]] | None = None
     default: float | None = None
     own_default: bool = False
@@ -412,6 +415,7 @@ LIFT_FACTOR = Parameter(
     guess=_neutral(NEUTRAL_LIFT_FACTOR),
     apply=_scale_lift,
     limits=lambda _: Linear(LIFT_UNIT, NEUTRAL_LIFT_FACTOR).box(*LIFT_LIMITS, 1),
+    apart=True,
     default=NEUTRAL_LIFT_FACTOR,
 )
 

@@ -77,7 +77,7 @@ def _division(model: ChainModel, batch: ParameterBatch, number: int) -> Array:
     """Shares (p, n) of one surface's span that its links have."""
     if model.surfaces[number, 1] == 1:
         return np.ones((batch.particles, 1))
-    return np.asarray(batch["division"][:, model.set_of(batch)[number]])
+    return np.asarray(batch.of_set("division", model.set_of(batch)[number]))
 
 
 def _zero_lift(model: ChainModel, batch: ParameterBatch, number: int) -> Array:

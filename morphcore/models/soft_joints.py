@@ -25,9 +25,9 @@ def soft_joint(model: ChainModel, batch: ParameterBatch) -> Obstacle | None:
     for surface, own in zip(model.aircraft.surfaces, model.set_of(batch), strict=True):
         if not surface.flexible:
             continue
-        joints_m = link_edges(batch["division"][:1, own], surface.length_m)[0, 1:-1]
+        joints_m = link_edges(batch.of_set("division", own)[:1], surface.length_m)[0, 1:-1]
         moment = 0.5 * load_n_m * (surface.length_m - joints_m) ** 2
-        for joint, stiffness in enumerate(batch["stiffness_nm_rad"][0, own, :, 0]):
+        for joint, stiffness in enumerate(batch.of_set("stiffness_nm_rad", own)[0, :, 0]):
             carries = stiffness > NO_STIFFNESS * moment[joint]
             angle = float(moment[joint] / stiffness) if carries else float("inf")
             if angle > worst[0]:

@@ -127,7 +127,7 @@ class MorphCase:
     def chain(self, name: ModelName) -> tuple[ChainModel, ParameterBatch]:
         """One of the models used in the search, and its parameters."""
         if name == "equivalent":
-            links = self.parameters.links
+            links = self.parameters.links_per_wing
             model = chain_model(self.aircraft, self.flight, links, self.lattice)
             return model, fitted(model, self.parameters)
         rigid = chain_model(self.aircraft, self.flight, 1, self.lattice)

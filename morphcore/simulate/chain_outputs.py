@@ -81,7 +81,7 @@ def point_forces(
         surface = model.aircraft.surfaces[number]
         division = np.ones((1, 1))
         if surface.flexible:
-            division = batch["division"][:1, model.set_of(batch)[number]]
+            division = batch.of_set("division", model.set_of(batch)[number])[:1]
         edges = link_edges(division, surface.length_m)[0]
         inside = max(int(np.searchsorted(edges, point.at * surface.length_m)) - 1, 0)
         arm = point.arm_W(surface, float(edges[inside]))

@@ -410,7 +410,7 @@ def _flyer(aircraft: Aircraft, flight: Flight, model: ModelChoice, lattice: Latt
                 pointer="/model",
                 hint="choose one with ParameterBatch.select, or fly them together with fly_batch",
             )
-        chain = chain_model(aircraft, flight, model.links, lattice)
+        chain = chain_model(aircraft, flight, model.links_per_wing, lattice)
         return _chain_flyer(chain, fitted(chain, model))
     if model == "rigid":
         chain = chain_model(aircraft, flight, 1, lattice)

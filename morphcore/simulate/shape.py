@@ -142,7 +142,7 @@ def chain_shape(model: ChainModel, batch: ParameterBatch, hinges: Array, q_joint
         zip(model.aircraft.surfaces, model.lattice.lattices, strict=True)
     ):
         first, count = int(model.surfaces[number, 0]), int(model.surfaces[number, 1])
-        division = np.ones((1, 1)) if not surface.flexible else batch["division"][:1, chosen[number]]
+        division = np.ones((1, 1)) if not surface.flexible else batch.of_set("division", chosen[number])[:1]
         distance, link, origin = link_stations(part, link_edges(division, surface.length_m)[0])
         R_BW, r_B = hinges[:, number, :9].reshape(-1, 3, 3), hinges[:, number, H_ORIGIN:]
         own = slice(first, first + count)

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from morphdata.aircraft import Aircraft, Surface
 from morphdata.drive_keys import resolved
-from morphdata.drives import SIDES, Hinge, drive_name, shown_drives
+from morphdata.drives import SIDES, shown_drives
 from morphdata.identifiable import corrections, on_request
 from morphdata.identified import CostEstimate, IdentifyResult
 from morphdata.identify import IdentifyRequest, SamplesRequest, Search
-from morphdata.masses import reflected_masses
+from morphdata.links import LinksPerWing, mean_links, to_choose
 from morphdata.operations.descriptor import Operation, after_budget
+from morphdata.pairs import joints_of_sets, mirror_pairs, own_lift_count
 from morphdata.samples import InlineSample
-from morphdata.vehicle import paired_by_reflection
 
 # nominal figures, to an order of magnitude, for settings that a request leaves to the solver
 SWARM_PARTICLES = {"pso": 200, "cma": 32}
@@ -48,8 +47,8 @@ def cost(request: SamplesRequest) -> CostEstimate:
     )
 
 
-def _cost_of_links(request: SamplesRequest, links: int) -> CostEstimate:
-    """Estimate flights and computing time of one identification with a number of links per wing."""
+def _cost_of_links(request: SamplesRequest, links: LinksPerWing) -> CostEstimate:
+    """Estimate flights and computing time of one identification with so many links per wing."""
     samples = list(request.inline_samples().values())
     training = [sample for sample in samples if sample.role == "train"]
     parameters = _parameter_count(request, links, training)
@@ -61,18 +60,18 @@ def _cost_of_links(request: SamplesRequest, links: int) -> CostEstimate:
         parameters=parameters,
         flights=sets * len(training),
         flight_s=flight_s,
-        core_s=flight_s / REAL_TIME_FACTOR * max(links / REFERENCE_LINKS, 1.0),
+        core_s=flight_s / REAL_TIME_FACTOR * max(mean_links(links) / REFERENCE_LINKS, 1.0),
     )
 
 
-def _parameter_count(request: SamplesRequest, links: int, training: Sequence[InlineSample]) -> int:
+def _parameter_count(request: SamplesRequest, links: LinksPerWing, training: Sequence[InlineSample]) -> int:
     """Count the unknowns: per joint three stiffnesses, three dampings and a share, and the corrections.
 
     Every flexible surface has its own, except that mirror images may share theirs; a pair always shares the
-    profile drag and the coefficients of its sections.
+    profile drag and the coefficients of its sections. Lift factors of their own are of rigid surfaces too.
     """
-    model, surfaces = request.model, request.aircraft.surfaces
-    groups = _mirror_groups(request.aircraft)
+    model, surfaces, pairs = request.model, request.aircraft.surfaces, mirror_pairs(request.aircraft)
+    groups = sum(surfaces[pair[0]].flexible for pair in pairs)
     if model.aero_coefficients is None:
         bounded = () if model.bounds is None else model.bounds.given()
         left_out = {name for name in on_request() if name not in bounded}
@@ -82,50 +81,10 @@ def _parameter_count(request: SamplesRequest, links: int, training: Sequence[Inl
     else:
         searched = list(model.aero_coefficients)
     of_pairs = sum(name in ("profile_drag", *on_request()) for name in searched)
-    sets = sum(surface.flexible for surface in surfaces) if model.separate_wings else groups
-    return 7 * (links - 1) * sets + len(searched) + of_pairs * (groups - 1)
-
-
-def _mirror_groups(aircraft: Aircraft) -> int:
-    """Count the flexible surfaces, with mirror images and what they carry counted once."""
-    flexible = [each for each in aircraft.surfaces if each.flexible]
-    carried = [reflected_masses(aircraft.point_masses or [], each.name) for each in flexible]
-    nameless = [(_plainly(each), own) for each, (own, _) in zip(flexible, carried, strict=True)]
-    reflections = [
-        (_reflection(each), images) for (each, _), (_, images) in zip(nameless, carried, strict=True)
-    ]
-    return len(paired_by_reflection(nameless, reflections))
-
-
-def _reflection(surface: Surface) -> Surface:
-    side = "left" if surface.side == "right" else "right"
-    hinges = [_mirrored(hinge, surface.side, side) for hinge in surface.all_hinges]
-    return surface.model_copy(
-        update={"side": side, "position_m": _across(surface.position_m), "hinges": hinges}
-    )
-
-
-def _mirrored(hinge: Hinge, from_side: str, to_side: str) -> Hinge:
-    """Return a hinge's mirror image: a rotation vector keeps its y and changes the other signs."""
-    x, y, z = hinge.axis_B(from_side)
-    name = drive_name(hinge, from_side).removesuffix(f"_{from_side}") + f"_{to_side}"
-    update = {"name": name, "axis": [-x, y, -z], "position_m": _across(hinge.position_m)}
-    return hinge.model_copy(update=update)
-
-
-def _plainly(surface: Surface) -> Surface:
-    """Return a surface without its name, with its hinges in normal form: a list, with names and vectors."""
-    hinges = [
-        hinge.model_copy(
-            update={"name": drive_name(hinge, surface.side), "axis": list(hinge.axis_B(surface.side))}
-        )
-        for hinge in surface.all_hinges
-    ]
-    return surface.model_copy(update={"name": "", "hinge": None, "hinges": hinges})
-
-
-def _across(position_m: list[float] | None) -> list[float] | None:
-    return position_m and [position_m[0], -position_m[1], position_m[2]]
+    apart = own_lift_count(request.aircraft, model.own_lift or ())
+    joints = joints_of_sets(request.aircraft, links, separate_wings=model.separate_wings)
+    aero = len(searched) + of_pairs * (groups - 1) + apart * ("lift_factor" in searched)
+    return 7 * joints + aero
 
 
 def _asymmetric(sample: InlineSample) -> bool:
@@ -171,7 +130,7 @@ def samples_summary(request: SamplesRequest) -> dict[str, Any]:
 
 def _summary(request: IdentifyRequest) -> dict[str, Any]:
     links = request.model.links_per_wing
-    return {**samples_summary(request), "links_per_wing": None if links == "auto" else links}
+    return {**samples_summary(request), "links_per_wing": None if to_choose(links) else links}
 
 
 IDENTIFY = Operation(

@@ -128,7 +128,9 @@ def _form(flag: str, field: FieldInfo) -> Form:
         return Form(str, choices[0] if len(choices) == 1 else "NAME", str, remark)
     if kind in (bool, int, float, str):
         words = [word for other in others if get_origin(other) is Literal for word in get_args(other)]
-        return _number_or_word(words) if words else Form(kind, _limits(field) if kind is int else None, kind)
+        by_name = any(get_origin(other) is dict for other in others)
+        plain = _number_or_word(words) if words else Form(kind, _limits(field) if kind is int else None, kind)
+        return _number_or_names(flag, plain) if by_name else plain
     if get_origin(kind) is list:
         return _list_form(flag, get_args(kind)[0])
     fields = {} if get_origin(kind) is dict else kind.model_fields
@@ -151,12 +153,38 @@ def _number_or_word(words: Sequence[str]) -> Form:
     return Form(str, "|".join(["N", *words]), lambda text: int(text) if text.isdecimal() else text)
 
 
+def _number_or_names(flag: str, plain: Form) -> Form:
+    """Read ``wing=4,tail=1`` as numbers by name, and what has no name in the plain form."""
+
+    def read(text: str) -> Any:
+        if "=" not in text:
+            return plain.read(text)
+        pairs = [part.rpartition("=") for part in text.split(",")]
+        if not all(name.strip() and number.strip().isdecimal() for name, _, number in pairs):
+            hint = f"write {flag} wing=4,tail=1"
+            raise CommandError(f"{flag} {text}: not of the form NAME=N,NAME=N", code=Exit.USAGE, hint=hint)
+        return {name.strip(): int(number) for name, _, number in pairs}
+
+    return Form(str, f"{plain.metavar}|NAME=N,...", read)
+
+
+def _numbers_or_names(flag: str, text: str) -> list[Any]:
+    """Read ``1,2,wing=4+tail=1``: numbers, and numbers by name."""
+    words = text.split(",")
+    plain = [word for word in words if "=" not in word]
+    numbers = iter(_numbers(flag, ",".join(plain), int, "1,2,3") if plain else [])
+    named = _number_or_names(flag, Form(str, None, str)).read
+    return [named(word.replace("+", ",")) if "=" in word else next(numbers) for word in words]
+
+
 def _list_form(flag: str, item: Any) -> Form:
     if get_origin(item) is Literal:
         remark = f"Any of {', '.join(get_args(item))}."
         return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")], remark)
     if _kinds(item) == [str]:
         return Form(str, "NAME,NAME,...", lambda text: [word.strip() for word in text.split(",")])
+    if any(get_origin(kind) is dict for kind in _kinds(item)):
+        return Form(str, "N,N,NAME=N+NAME=N,...", lambda text: _numbers_or_names(flag, text))
     if float in _kinds(item):
 
         def read(text: str) -> list[float]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
+from morphdata.links import LinksPerWing, shown_links
 from morphid.commands.operation import Particulars
 from morphid.screen import new_table, short, stdout
 
@@ -16,7 +17,7 @@ def show_study(result: Mapping[str, Any]) -> None:
     stdout().print(study_table(result))
     grades = [(row["links_per_wing"], (row.get("verdict") or {}).get("grade")) for row in result["rows"]]
     if any(grade for _, grade in grades):
-        shown = ", ".join(f"{links}: {grade}" for links, grade in grades if grade)
+        shown = ", ".join(f"{_links(links)}: {grade}" for links, grade in grades if grade)
         stdout().print(f"Verdict by number of links: {shown}", markup=False, soft_wrap=True)
     recommended = result.get("recommended") or {}
     if recommended.get("reason"):
@@ -37,7 +38,7 @@ def study_table(result: Mapping[str, Any]) -> Table:
         mark = "* " if row["links_per_wing"] == recommended else ""
         rms = row.get("rms_rad") or {}
         table.add_row(
-            f"{mark}{row['links_per_wing']}",
+            f"{mark}{_links(row['links_per_wing'])}",
             str(row.get("bodies", "")),
             str(row.get("parameters", "")),
             short(row.get("J_train")),
@@ -47,6 +48,10 @@ def study_table(result: Mapping[str, Any]) -> Table:
             "" if row.get("identify_s") is None else f"{row['identify_s']:.1f} s",
         )
     return table
+
+
+def _links(links: LinksPerWing | str) -> str:
+    return shown_links(links) if isinstance(links, dict) else str(links)
 
 
 STUDY = Particulars(show_study)

@@ -206,5 +206,6 @@ OPTIMIZE_RESULT: Document = {
 
 
 def in_both_spellings(model: Document) -> Document:
-    """A model as the service returns it: renamed corrections under their old names, too."""
-    return {**model, "aero": {**model["aero"], "centre_shift_m": model["aero"]["ac_offset_m"]}}
+    """A model as the service returns it: renamed corrections under both names, and what it lacks."""
+    shared = {"centre_shift_m": model["aero"]["ac_offset_m"], "lift_factors": None}
+    return {**model, "aero": {**shared, **model["aero"]}}

@@ -92,6 +92,24 @@ def test_what_the_samples_do_not_determine_is_grey(service: RunningService, page
     assert "At a bound: damping, joint 1, torsion" in page.locator("main").inner_text()
 
 
+def test_links_and_lift_factors_of_unlike_surfaces(service: RunningService, page: Page) -> None:
+    """The numbers by surface in words, and each lift factor in a row of its own."""
+    own = {name: RESULT["model"][name] for name in ("division", "stiffness_nm_rad", "damping_nms_rad")}
+    rigid = {"division": [1.0], "stiffness_nm_rad": [], "damping_nms_rad": [], "profile_drag": 0.02}
+    model = {
+        **copy.deepcopy(RESULT["model"]),
+        "links_per_wing": {"wing": 2, "tail": 1},
+        "surfaces": {"right wing": {**own, "profile_drag": 0.01}, "right tail": rigid},
+    }
+    model["aero"]["lift_factors"] = {"tail": 0.9}
+    text = shown(page, service, ended(service, "identify", identify_document(), result(model=model)))
+    assert "1 link of tail, 2 of wing; joints" in text
+    group = "Aerodynamic corrections"
+    for title, value in (("Lift factor", "1"), ("tail, lift factor", "0.9")):
+        assert parameter(page, group, title).locator("td").first.inner_text() == value
+    assert parameter(page, "Share of the span", "right wing, link 2").count() == 1
+
+
 def test_a_search_without_a_flying_model_shows_none(service: RunningService, page: Page) -> None:
     """A search that was stopped before it found a model that flies says so instead of parameters."""
     lost = {**result(model=None, warnings=WARNINGS), "partial": True}

@@ -12,25 +12,26 @@ import pytest
 
 from morphcore.export.curves import study_table
 from morphcore.export.study_plots import study_figure, study_plots
+from morphdata.links import mean_links
 
 
-def row(links: int, **changes: Any) -> dict[str, Any]:
+def row(links: Any, **changes: Any) -> dict[str, Any]:
     """Make a study's row."""
     return {
         "links_per_wing": links,
-        "bodies": 2 * links + 1,
-        "parameters": 7 * (links - 1) + 4,
-        "J_train": 0.1 / 10**links,
-        "J_held_out": 0.3 / 10**links,
+        "bodies": 2 * mean_links(links) + 1,
+        "parameters": 7 * (mean_links(links) - 1) + 4,
+        "J_train": 0.1 / 10 ** mean_links(links),
+        "J_held_out": 0.3 / 10 ** mean_links(links),
         "rms_rad": {"phi": 1e-3, "theta": 2e-3, "psi": None},
-        "flight_s": 0.01 * links,
+        "flight_s": 0.01 * mean_links(links),
         "identify_s": 1.0,
         "flights": 100,
         **changes,
     }
 
 
-def study(*rows: dict[str, Any], recommended: int | None = 2) -> dict[str, Any]:
+def study(*rows: dict[str, Any], recommended: Any = 2) -> dict[str, Any]:
     """Make a study's result."""
     return {
         "rows": list(rows),
@@ -51,6 +52,18 @@ def test_the_picture_shows_accuracy_and_price() -> None:
     assert low < 1e-4
     assert high > 0.2, "the rigid model is within the picture"
     assert price.get_ylabel().endswith("ms")
+
+
+def test_numbers_that_differ_by_surface_stand_at_their_mean() -> None:
+    """In the picture; in the table they are written out."""
+    unlike = {"wing": 4, "tail": 1}
+    document = study(row(1), row(unlike), row(4), recommended=unlike)
+    figure = study_figure(document)
+    assert figure.axes[1].lines[0].get_xdata().tolist() == [1.0, 2.5, 4.0]
+    assert "4 links of wing, 1 of tail" in figure.texts[0].get_text()
+    rows = list(csv.DictReader(io.StringIO(study_table(document).decode())))
+    assert [each["links_per_wing"] for each in rows] == ["1", "4 links of wing, 1 of tail", "4"]
+    assert [each["recommended"] for each in rows] == ["", "yes", ""]
 
 
 def test_the_title_says_which_to_take() -> None:

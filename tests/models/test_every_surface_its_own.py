@@ -34,6 +34,7 @@ from morphcore.simulate.trajectory import Trajectory
 from morphdata import aircraft as documents
 from morphdata.identify import EquivalentModel
 from morphdata.lattice import Lattice
+from morphdata.links import LinksPerWing
 from tests.models.chains import example_flight
 from tests.simulate.flights import fly
 
@@ -80,7 +81,7 @@ def flight() -> Flight:
     return replace(example_flight(), airspeed_m_s=70.0, start=None)
 
 
-def chain(names: tuple[str, ...] = NAMES, links: int = 2, **change: dict[str, Any]) -> ChainModel:
+def chain(names: tuple[str, ...] = NAMES, links: LinksPerWing = 2, **change: dict[str, Any]) -> ChainModel:
     """The equivalent model."""
     return chain_model(aircraft(names, **change), flight(), links, LATTICE)
 

@@ -30,7 +30,7 @@ from morphcore.simulate.schedule import Hold
 from morphcore.simulate.torque import hinge_torques
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.aircraft import load_aircraft
-from morphdata.operations.identify import _mirror_groups
+from morphdata.pairs import mirror_pairs
 from tests.models.chains import (
     EXAMPLES,
     SMALL_LATTICE,
@@ -435,9 +435,9 @@ def test_masses_on_one_side_make_the_aircraft_asymmetric() -> None:
         assert (mirror_of(aircraft, flight) is not None) is is_symmetric
         on_wings = [mass for mass in masses if "surface" in mass]
         document = load_aircraft(EXAMPLES / "aircraft.json").model_dump(exclude_none=True)
-        groups = _mirror_groups(AircraftDocument.parse(document | {"point_masses": on_wings}))
+        pairs = mirror_pairs(AircraftDocument.parse(document | {"point_masses": on_wings}))
         is_pair = mirror_of(example_with(*on_wings), flight) is not None
-        assert groups == (1 if is_pair else 2)
+        assert len(pairs) == (1 if is_pair else 2)
 
 
 @pytest.mark.parametrize(

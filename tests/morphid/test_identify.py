@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from morphdata.identify import IdentifyRequest
+from morphid.commands.fields import field_options
 from morphid.exits import Exit
 from morphid.main import app
 from tests.morphid.played_service import Play, PlayedService
@@ -71,6 +73,39 @@ def test_bounds_are_options_too(examples: Path, play: Play) -> None:
         "separate_wings": True,
         "bounds": {"lag_s": [0.001, 0.01], "lift_factor": [0.8, 1.2], "ac_offset_m": [-0.1, 0.1]},
     }
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("4", 4),
+        ("auto", "auto"),
+        ("wing=4", {"wing": 4}),
+        ("right wing=4, tail=1", {"right wing": 4, "tail": 1}),
+    ],
+)
+def test_links_by_surface_are_one_option(text: str, expected: object) -> None:
+    """A number, the word, or numbers by name."""
+    option = next(each for each in field_options(IdentifyRequest) if each.flag == "--links")
+    assert option.read(text) == expected
+
+
+@pytest.mark.parametrize(
+    ("links", "code", "reported"),
+    [
+        ("wing=", Exit.USAGE, "write --links wing=4,tail=1"),
+        ("wing=4,3", Exit.USAGE, "write --links wing=4,tail=1"),
+        ("wing=4,fin=1", Exit.INVALID_INPUT, "each flexible surface: wing"),
+        ("wing=17", Exit.INVALID_INPUT, "at most 16"),
+        ("left wing=4,right wing=3", Exit.INVALID_INPUT, "give it once, for 'wing'"),
+    ],
+)
+def test_links_that_make_no_sense_are_named(examples: Path, links: str, code: Exit, reported: str) -> None:
+    """With the names to use, before anything is loaded."""
+    words = [word for word in arguments(examples) if word not in ("--url", "http://there")]
+    ended = RUNNER.invoke(app, [*words, "--links", links])
+    assert ended.exit_code == code, ended.output
+    assert reported in " ".join(ended.stderr.replace("│", " ").split())
 
 
 @pytest.mark.parametrize(

@@ -76,6 +76,18 @@ def test_surfaces_that_are_not_alike_have_rows_of_their_own() -> None:
     assert "right tail.profile_drag" in found
 
 
+def test_other_links_and_lift_factors_of_a_tail_have_their_rows() -> None:
+    """As many joints as each surface has, and the factors by the names of the search."""
+    model = chain(links={"wing": 3, "tail": 1})
+    space = search_space(model, own_lift=None)
+    batch = physical_guess(model, apart=("tail",))
+    document = parameters_document(batch)
+    expected = dict(zip(space.parameter_names, space.flatten(batch)[0].tolist(), strict=True))
+    assert dict(named_parameters(document)) == expected
+    assert "tail.lift_factor" in expected
+    assert "3 links of wing, 1 of tail" in shown({"model": document})
+
+
 def test_rows_have_intervals_and_marks() -> None:
     """Each row its own interval, open sides open; grey what is not seen; marked: at a bound, fixed."""
     lines = {

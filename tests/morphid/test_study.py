@@ -57,12 +57,24 @@ def test_the_choices_reach_the_service(play: Play) -> None:
     assert "No model flew." in ended.stdout
 
 
+def test_numbers_by_surface_are_listed_too(play: Play) -> None:
+    """Between others, with a plus between the surfaces."""
+    result = {"rows": [], "recommended": {"links_per_wing": None, "reason": "No model flew."}}
+    played = play(PlayedService("study", result))
+    words = (*SAMPLES, "--links", "1,wing=3,wing=4", "--url", "http://played")
+    ended = RUNNER.invoke(app, command("study", *words))
+    assert ended.exit_code == Exit.OK, ended.output
+    assert played.body["model"] == {"links_per_wing": [1, {"wing": 3}, {"wing": 4}]}
+
+
 @pytest.mark.parametrize(
     ("links", "code", "reported"),
     [
         ("1,two", Exit.USAGE, "write --links 1,2,3"),
         ("1,1", Exit.INVALID_INPUT, "given by --links 1,1"),
         ("1,99", Exit.INVALID_INPUT, "given by --links 1,99"),
+        ("1,wing=", Exit.USAGE, "NAME=N"),
+        ("1,wing=2+fin=1", Exit.INVALID_INPUT, "each flexible surface: wing"),
     ],
 )
 def test_wrong_numbers_of_links_are_named(links: str, code: Exit, reported: str) -> None:

@@ -44,10 +44,12 @@ function parameterGroups(model) {
   const joints = (field) => sets.flatMap(([prefix, of, own]) => (own[field] ?? []).flatMap((row, joint) => [row].flat().map((value, i) => {
     return { name: `${prefix}${field}.joint_${joint + 1}.${AXES[i]}`, title: `${of}joint ${joint + 1}, ${AXES[i]}`, value };
   })));
-  const aero = Object.entries(underCurrentNames(model.aero)).flatMap(([name, value]) => {
+  const { lift_factors: apart, ...shared } = underCurrentNames(model.aero);
+  const aero = Object.entries(shared).flatMap(([name, value]) => {
     const title = AERO[name] ?? name.replaceAll("_", " ");
     const each = sets.filter(([, , own]) => own[name] !== undefined); // corrections that each surface has
-    if (!each.length) return [{ name, title, value }];
+    const own = name === "lift_factor" ? Object.entries(apart ?? {}) : [];
+    if (!each.length) return [{ name, title, value }, ...own.map(([of, value]) => ({ name: `${of}.${name}`, title: `${of}, ${title.toLowerCase()}`, value }))];
     return each.map(([prefix, of, own]) => ({ name: `${prefix}${name}`, title: `${of}${title.toLowerCase()}`, value: own[name] }));
   });
   const groups = { division: shares, stiffness_nm_rad: joints("stiffness_nm_rad"), damping_nms_rad: joints("damping_nms_rad"), aero };
@@ -113,7 +115,7 @@ function modelCard(result, title = "Identified model") {
   ));
   return card(
     title, { help: "parameters" },
-    element("p", { class: "soft" }, `${count(result.model.links_per_wing, "link")} per wing; joints and links are counted from the root.`),
+    element("p", { class: "soft" }, `${perWing(result.model.links_per_wing)}; joints and links are counted from the root.`),
     namesLine("At a bound", currentNames(result.uncertainty?.at_bound)),
     element("table", { class: "parameters" }, head, ...bodies),
   );

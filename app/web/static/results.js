@@ -3,17 +3,22 @@
 
 const number = (text) => ({ text, number: true });
 const count = (value, unit) => `${value} ${unit}${value === 1 ? "" : "s"}`;
+/* Links per wing: "4 links", or by surface "4 links of wing, 1 of tail". */
+const linksText = (links) => (typeof links === "number" ? count(links, "link")
+  : Object.entries(links).map(([name, own], i) => `${i ? own : count(own, "link")} of ${name}`).join(", "));
+const perWing = (links) => (typeof links === "number" ? `${linksText(links)} per wing` : linksText(links));
+const comparedText = (every) => (every.every((links) => typeof links === "number") ? `${every.join(", ")} links` : every.map(linksText).join("; "));
 const ANGLES = [["phi", "φ"], ["theta", "θ"], ["psi", "ψ"]];
 const LETTERS = Object.fromEntries(ANGLES);
 const RMS_TITLES = ANGLES.map(([, letter]) => number(`RMS ${letter}, mrad`));
 
 /* ---- requests in few words ---- */
 
-const links = (asked) => (asked.links_per_wing ? count(asked.links_per_wing, "link") : null);
+const links = (asked) => (asked.links_per_wing ? linksText(asked.links_per_wing) : null);
 const drives = (asked) => asked.drives?.join(", ").replaceAll("_", " ");
 const DESCRIBED = {
   identify: (asked) => [drives(asked), links(asked), asked.method],
-  study: (asked) => [drives(asked), `${asked.compared_links.join(", ")} links`, asked.method],
+  study: (asked) => [drives(asked), comparedText(asked.compared_links), asked.method],
   simulate: (asked) => [drives(asked), `${asked.model} model`, links(asked), `${asked.duration_s} s`],
   optimize: (asked) => [drives(asked), `to ${show.number(asked.final_rad)} rad in ${asked.duration_s} s`, links(asked), asked.method],
   export: (asked) => [links(asked), asked.format],
@@ -86,9 +91,9 @@ function fitCard(fits, title = "Fit") {
 }
 
 function studyCards(result) {
-  const chosen = result.rows.findIndex((row) => row.links_per_wing === result.recommended?.links_per_wing);
+  const chosen = result.rows.findIndex((row) => JSON.stringify(row.links_per_wing) === JSON.stringify(result.recommended?.links_per_wing));
   const rows = result.rows.map((row) => [
-    count(row.links_per_wing, "link"), String(row.bodies), String(row.parameters), show.cost(row.J_train), show.cost(row.J_held_out),
+    linksText(row.links_per_wing), String(row.bodies), String(row.parameters), show.cost(row.J_train), show.cost(row.J_held_out),
     ...ANGLES.map(([angle]) => show.milliradians(row.rms_rad[angle])), show.milliseconds(row.flight_s), show.duration(row.identify_s), row.verdict ? grade(row.verdict) : "–",
   ]);
   const titles = ["Links per wing", ...["Bodies", "Unknowns", "J fitted, rad²", "J held out, rad²"].map(number), ...RMS_TITLES, ...["One flight, ms", "Identified in", "Verdict"].map(number)];
@@ -96,8 +101,8 @@ function studyCards(result) {
   const cards = [card("Accuracy and cost", { help: "study" }, reason, table(titles, rows, { marked: chosen, stack: true }))];
   if (chosen >= 0) {
     const row = result.rows[chosen];
-    cards.push(...[verdictCard(row.verdict, `Verdict on ${count(row.links_per_wing, "link")} per wing`)].filter(Boolean));
-    cards.push(fitCard(row.fit, `Fit with ${count(row.links_per_wing, "link")} per wing`), modelCard({ search: result.search, ...row }, "Recommended model"));
+    cards.push(...[verdictCard(row.verdict, `Verdict on ${perWing(row.links_per_wing)}`)].filter(Boolean));
+    cards.push(fitCard(row.fit, `Fit with ${perWing(row.links_per_wing)}`), modelCard({ search: result.search, ...row }, "Recommended model"));
   }
   return cards;
 }
