@@ -15,11 +15,12 @@ from morphdata.environment import Environment
 from morphdata.execution import Request
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
+from morphdata.history import MAX_DURATION_S, Duration
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
 from morphdata.options import MODEL, OUTPUT, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS
-from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
+from morphdata.schedules import EXAMPLE_SCHEDULE, Schedules
 from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults, trim_drive_faults
 from morphdata.warnings import Warnings
 

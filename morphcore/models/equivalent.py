@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.kernels.loads import L_MOMENT
+from morphcore.aero.kernels.loads import L_MOMENT, LINKS, PAIR0, STRIPS, TELESCOPES
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.aero.vlm import prandtl_glauert
 from morphcore.errors import InvalidInput
@@ -25,6 +25,7 @@ from morphcore.models.kernels.layout import (
     MOMENT_C,
     joint_rows_of_scratch,
     state_rows,
+    visible_rows_of_scratch,
 )
 from morphcore.models.links import beam_division, link_edges
 from morphcore.models.parameters import CHAIN_PARAMETERS, CutSurface, Parameter, SurfaceRows
@@ -108,9 +109,10 @@ class ParameterBatch(Shown):
 class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
-    surfaces : (s, 11) first link, links, first strip, strips, first overlap pair of each surface; whether it
+    surfaces : (s, 12) first link, links, first strip, strips, first overlap pair of each surface; whether it
         also represents its mirror image; the first of its further outputs of the lattice (or -1); its
-        `AircraftLattice.control_inputs`; whether it carries point masses.
+        `AircraftLattice.control_inputs`; whether it carries point masses; the sign of its span if it
+        telescopes, else 0.
     """
 
     aircraft: Aircraft
@@ -175,7 +177,11 @@ class ChainModel(Shown):
     @property
     def scratch_rows(self) -> int:
         """Number of rows of a block's scratch."""
-        return int(joint_rows_of_scratch(self.links, self.coordinates)[-1])
+        rows = int(joint_rows_of_scratch(self.links, self.coordinates)[-1])
+        if not self.surfaces[:, TELESCOPES].any():
+            return rows
+        pairs = self.surfaces[-1, PAIR0] + self.surfaces[-1, LINKS] * self.surfaces[-1, STRIPS]
+        return int(visible_rows_of_scratch(self.links, self.coordinates)[-1] + 2 * pairs)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -317,7 +323,9 @@ def _chain_model(
     ):
         count = links_per_wing if surface.flexible else 1
         more, lumped = lattices.more_rows(strip0), int(bool(surface.point_masses))
-        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more, *controls, lumped])
+        slides = 0 if surface.mouth_m is None else int(surface.span_sign)
+        seats = [strip0, part.spanwise, pair, int(bool(images)), more]
+        rows.append([link, count, *seats, *controls, lumped, slides])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))

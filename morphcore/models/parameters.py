@@ -276,6 +276,10 @@ def _cut(rows: SurfaceRows, division: Array) -> None:
     rows.links[:, :, L_CHORD_X], rows.links[:, :, L_CHORD_Y], rows.links[:, :, L_SKEW] = x, y, y / x
     weight, middle = strip_overlap(surface, rows.part, edges)
     rows.overlap[:] = np.stack([weight, middle], axis=-1).reshape(particles, -1)
+    if surface.mouth_m is not None:  # models/kernels/telescope.py: areas of strips, each strip on any link
+        rows.links[:, :, [L_DRAG, L_MOMENT]] = 1.0
+        rows.touched[:, :, 0], rows.touched[:, :, 1] = 0, rows.part.spanwise
+        return
     is_touched = weight > 0.0
     rows.touched[:, :, 0] = np.argmax(is_touched, axis=1)
     rows.touched[:, :, 1] = rows.part.spanwise - np.argmax(is_touched[:, ::-1], axis=1)

@@ -127,10 +127,11 @@ def require_ranges(aircraft: Aircraft, followed: Followed, times_s: np.ndarray, 
             angle = schedule.motion(times_s).angle
             outside = hinge.beyond_range(angle)
             if outside.size:
-                row, kind = outside[0], part_name(hinge)
+                row, kind, unit = outside[0], part_name(hinge), hinge.unit
+                values = "angles" if unit == "rad" else "extensions"
                 raise InvalidInput(
-                    f"the {kind} {hinge.drive} of {surface.name} is driven to {angle[row]:.4g} rad at "
-                    f"t = {times_s[row]:.3f} s, beyond its range {hinge.min_rad:g}..{hinge.max_rad:g} rad",
+                    f"the {kind} {hinge.drive} of {surface.name} is driven to {angle[row]:.4g} {unit} at "
+                    f"t = {times_s[row]:.3f} s, beyond its range {hinge.min_rad:g}..{hinge.max_rad:g} {unit}",
                     pointer=f"{pointer}/{key}",
-                    hint=f"lower the angles, or widen the {kind}'s range; a spline can go beyond its knots",
+                    hint=f"lower the {values}, or widen the {kind}'s range; a spline can go beyond its knots",
                 )

@@ -307,7 +307,13 @@ def common_path(
     InvalidInput : the trim drive is among the path's drives.
     """
     chosen = None if drives is None else tuple(drives)
-    path = np.linspace(low_rad, high_rad, _nodes(high_rad - low_rad, node_spacing_rad))
+    sizes = [
+        size
+        for part, size in zip(model.aircraft.hinges, path_lengths(model.aircraft), strict=True)
+        if _moves(part, chosen)
+    ]
+    width = (high_rad - low_rad) * max(sizes, default=1.0)
+    path = np.linspace(low_rad, high_rad, _nodes(width, node_spacing_rad))
     angles = path_angles(model.aircraft, chosen, path)
     still = np.zeros_like(angles)
     deflected = deflections(model.aircraft, path_controls(model.aircraft, chosen, path))
@@ -340,6 +346,20 @@ def common_path(
         bool(model.lattice.images),
         begin,
         _stacked_controls(operators),
+    )
+
+
+def path_lengths(aircraft: Aircraft) -> Array:
+    """What (h,) a unit of each hinge counts in the path along which lattices are tabulated: 1 for an angle.
+
+    Extensions count in lengths of their surface: by as much as an angle of the same size moves its tip.
+    """
+    return np.array(
+        [
+            1.0 / surface.length_m if hinge.prismatic else 1.0
+            for surface in aircraft.surfaces
+            for hinge in surface.hinges
+        ]
     )
 
 
@@ -444,7 +464,7 @@ def _operator_table(
     model: ChainModel, motion: _Motion, spacing: float, wake_alpha: float, spacing_s: float
 ) -> OperatorTable:
     mach, angles, wake = model.flight.mach or 0.0, motion.angles, wake_direction(wake_alpha)
-    moved = np.abs(np.diff(angles, axis=0))
+    moved = np.abs(np.diff(angles, axis=0)) * path_lengths(model.aircraft)
     # a surface turns by no more than all its hinges together
     turned = np.stack([moved[:, own].sum(axis=1) for own in model.aircraft.hinge_columns])
     travelled = np.concatenate([[0.0], np.cumsum(turned.max(axis=0))])

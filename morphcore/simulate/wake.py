@@ -76,6 +76,13 @@ def trim_drives(aircraft: Aircraft, name: str | None) -> tuple[Drive, ...]:
             pointer="/flight/trim_drive",
             hint=f"its drives are {', '.join(drives)}" if drives else "it has no drives: omit trim_drive",
         )
+    if any(drive.unit != "rad" for drive in found):
+        turning = [drive.name for drive in drives.values() if drive.unit == "rad"]
+        raise InvalidInput(
+            f"the drive {name!r} slides, and a trim turns its drive",
+            pointer="/flight/trim_drive",
+            hint=f"those that turn are {', '.join(turning)}" if turning else "none turns: omit trim_drive",
+        )
     return found
 
 

@@ -48,6 +48,13 @@ def gravity_rows_of_scratch(links: int) -> int:
 
 
 @inlined
+def visible_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int]:
+    """First scratch rows, at the scratch's end, of links and of overlap where surfaces telescope."""
+    first = joint_rows_of_scratch(links, coordinates)[-1]
+    return first, first + LINK_ROWS * links
+
+
+@inlined
 def joint_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int, int, int, int]:
     """First scratch rows of joint forces, added diagonal, accelerations, gimbals; and the scratch's end."""
     first = S_FREE + 30 * links
