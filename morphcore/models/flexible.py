@@ -60,6 +60,15 @@ class FlexibleModel:
     fraction: Array
     apparent: Array
 
+    def at(self, angles: Array) -> FlexibleModel:
+        """The model with the lattice that it has at angles (h,) of all hinges: it slides as they telescope."""
+        lattice = self.lattice.at(angles)
+        if lattice is self.lattice:
+            return self
+        riders, element, fraction = _seats(self.aircraft, self.flight, lattice, self.roots, self.tips)
+        riders = replace(riders, control_slope=self.riders.control_slope)
+        return replace(self, lattice=lattice, riders=riders, element=element, fraction=fraction)
+
 
 def flexible_model(
     aircraft: Aircraft,
@@ -80,17 +89,14 @@ def flexible_model(
     rest, sections, damping = [], [], []
     bodies, inertia = [0], [fuselage_inertia(aircraft.fuselage)]
     roots, tips, rest_W = [], [], [np.zeros((1, 3))]
-    riders, places, apparent = [], [], [np.zeros((1, 6, 6))]
+    apparent = [np.zeros((1, 6, 6))]
     node = 1
-    for surface, part in zip(aircraft.surfaces, parts.lattices, strict=True):
+    for surface in aircraft.surfaces:
         count = elements if surface.flexible else 0
         roots.append(node)
         tips.append(node + count)
         stations = np.linspace(0.0, surface.length_m, count + 1)
         rest_W.append(stations[:, None] * np.array([0.0, surface.span_sign, 0.0]))
-        place = _section_places(surface, part, node, len(ends), count)
-        places.append(place[:2])
-        riders.append(_riders(surface, part, flight, place[2]))
         on_points, on_nodes = beam_lumps(surface, count)
         for e in range(count):
             ends.append([node + e, node + e + 1])
@@ -107,6 +113,8 @@ def flexible_model(
         if flight.apparent_mass:
             apparent.append(_apparent_at(surface, flight, stations))
     slopes = panel_slopes(parts.slopes, len(aircraft.controls), parts.lattices)
+    first, last = np.array(roots, dtype=np.int64), np.array(tips, dtype=np.int64)
+    riders, element, fraction = _seats(aircraft, flight, parts, first, last)
     beams = make_beams(
         np.array(ends).reshape(-1, 2), rest, sections, damping, bodies=bodies, inertia=inertia, nodes=node
     )
@@ -115,14 +123,28 @@ def flexible_model(
         flight=flight,
         lattice=parts,
         beams=beams,
-        roots=np.array(roots, dtype=np.int64),
-        tips=np.array(tips, dtype=np.int64),
+        roots=first,
+        tips=last,
         rest_W=np.concatenate(rest_W),
-        riders=replace(_joined(riders), control_slope=slopes),
-        element=np.concatenate([element for element, _ in places]),
-        fraction=np.concatenate([fraction for _, fraction in places]),
+        riders=replace(riders, control_slope=slopes),
+        element=element,
+        fraction=fraction,
         apparent=np.concatenate(apparent)[0 if flight.apparent_mass else 1 :],
     )
+
+
+def _seats(
+    aircraft: Aircraft, flight: Flight, lattice: AircraftLattice, roots: IntArray, tips: IntArray
+) -> tuple[Riders, IntArray, Array]:
+    """Riders of the whole lattice, and element and fraction (k,) of their sections; see `FlexibleModel`."""
+    riders, elements, fractions, first = [], [], [], 0
+    for surface, part, root, tip in zip(aircraft.surfaces, lattice.lattices, roots, tips, strict=True):
+        element, fraction, origin_W = _section_places(surface, part, int(root), first, int(tip - root))
+        elements.append(element)
+        fractions.append(fraction)
+        riders.append(_riders(surface, part, flight, origin_W))
+        first += int(tip - root)
+    return _joined(riders), np.concatenate(elements), np.concatenate(fractions)
 
 
 def _apparent_at(surface: Surface, flight: Flight, stations: Array) -> Array:
