@@ -25,10 +25,18 @@ from morphcore.geometry.fields import whole_number
 from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.section import SectionProperties
 from morphcore.geometry.surface import Surface
+from morphcore.models.kernels.telescope import HELD
 from morphcore.models.links import POINTS, WEIGHTS
 from morphcore.models.lumps import beam_lumps, moved_inertia, surface_lumps
 from morphcore.models.span_quadrature import span_points
-from morphcore.multibody.beam import GAUSS, GAUSS_WEIGHTS, Beams, Section, make_beams
+from morphcore.multibody.beam import (
+    GAUSS,
+    GAUSS_WEIGHTS,
+    Beams,
+    Section,
+    flexibility_parts,
+    make_beams,
+)
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
 
@@ -42,7 +50,8 @@ KINK = 1e-9  # of an element: nearer to its ends, a kink of the surface's proper
 class FlexibleModel:
     """Beams, lattice and the connection between them.
 
-    roots, tips : (s,) first and last node of each surface. rest_W : (n, 3) nodes of the unbent surfaces from
+    compliances : (e, 3, 6, 6) what each Gauss point adds to an element's flexibility, (0, ...) if no surface
+    telescopes. roots, tips : (s,) first and last node of each surface. rest_W : (n, 3) nodes of the unbent surfaces from
     their root node, in W, m. riders : the lattice on sections; element, fraction : (k,) where these are
     (element -1 - i is node i itself). apparent : (n, 6, 6) apparent mass of the air at the nodes, kg and m;
     (0, 6, 6) if the flight has none.
@@ -59,6 +68,26 @@ class FlexibleModel:
     element: IntArray
     fraction: Array
     apparent: Array
+    compliances: Array
+
+    def held(self, angles: Array) -> Array:
+        """Stiffness (e, 6, 6) of the elements at angles (h,) of all hinges: hidden parts are held straight.
+
+        Each Gauss point stands for the stretch of the element of its weight: it bends as far as that is
+        visible, and otherwise HELD times as much.
+        """
+        stiffness, first = self.beams.stiffness.copy(), 0
+        ends = np.cumsum([0.0, *GAUSS_WEIGHTS])
+        for surface, own, count in zip(
+            self.aircraft.surfaces, self.aircraft.hinge_columns, self.tips - self.roots, strict=True
+        ):
+            hidden = surface.hidden_m(angles[own]) / surface.length_m * count
+            for e in range(min(int(np.ceil(hidden)), count)):
+                seen = np.clip((e + ends[1:] - hidden) / GAUSS_WEIGHTS, HELD, 1.0)
+                total = np.einsum("g,gij->ij", seen, self.compliances[first + e])
+                stiffness[first + e] = np.linalg.inv(total)
+            first += count
+        return stiffness
 
     def at(self, angles: Array) -> FlexibleModel:
         """The model with the lattice that it has at angles (h,) of all hinges: it slides as they telescope."""
@@ -130,7 +159,20 @@ def flexible_model(
         element=element,
         fraction=fraction,
         apparent=np.concatenate(apparent)[0 if flight.apparent_mass else 1 :],
+        compliances=_compliances(aircraft, rest, sections),
     )
+
+
+def _compliances(aircraft: Aircraft, rest: list[list[float]], sections: list[list[Section]]) -> Array:
+    """See `FlexibleModel.compliances`."""
+    if all(surface.mouth_m is None for surface in aircraft.surfaces):
+        return np.zeros((0, GAUSS.size, 6, 6))
+    return np.array(
+        [
+            flexibility_parts(np.array(each[3:]), [section.stiffness for section in own])
+            for each, own in zip(rest, sections, strict=True)
+        ]
+    ).reshape(-1, GAUSS.size, 6, 6)
 
 
 def _seats(

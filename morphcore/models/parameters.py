@@ -44,6 +44,7 @@ from morphcore.models.links import (
     link_edges,
     link_masses,
     moment_areas,
+    segment_ends,
     strip_overlap,
     twist_slopes,
 )
@@ -278,6 +279,7 @@ def _cut(rows: SurfaceRows, division: Array) -> None:
     rows.overlap[:] = np.stack([weight, middle], axis=-1).reshape(particles, -1)
     if surface.mouth_m is not None:  # models/kernels/telescope.py: areas of strips, each strip on any link
         rows.links[:, :, [L_DRAG, L_MOMENT]] = 1.0
+        rows.links[:, :-1, L_DRAG_Y] = segment_ends(surface, edges)[:, 1:]
         rows.touched[:, :, 0], rows.touched[:, :, 1] = 0, rows.part.spanwise
         return
     is_touched = weight > 0.0

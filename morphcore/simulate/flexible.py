@@ -10,7 +10,7 @@ iteration.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -153,8 +153,12 @@ class FlexibleFlight:
     def __init__(self, model: FlexibleModel) -> None:
         flight = model.flight
         # a lattice that slides is written to, so it is the flight's own
-        model = model.at(np.array([hinge.angle_rad for hinge in model.aircraft.hinges]))
-        self.model = model
+        whole = model
+        begin = np.array([hinge.angle_rad for hinge in model.aircraft.hinges])
+        model = model.at(begin)
+        if model.compliances.size:
+            model = replace(model, beams=replace(model.beams, stiffness=model.held(begin)))
+        self._whole, self.model = whole, model
         self.thrust: Array = np.zeros(6)
         self.work = BeamWorkspace(model.beams)
         self.gravity_N: Array = np.array([0.0, 0.0, flight.gravity_m_s2])
@@ -181,6 +185,8 @@ class FlexibleFlight:
         seated = self.model.at(angles)
         self.model.element[:], self.model.fraction[:] = seated.element, seated.fraction
         self.sections.series[:] = helix_series(seated.fraction)
+        if self.model.compliances.size:
+            self.model.beams.stiffness[:] = self._whole.held(angles)
         self.lattice.reseat(seated.lattice.table, seated.riders, seated.lattice.settings.core)
         return seated.riders.lag_time
 

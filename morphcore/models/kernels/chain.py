@@ -205,12 +205,12 @@ def accelerations(
 
     # air loads
     effective = scratch[w_effective : w_effective + 3 * links]
-    w_seen, w_seen_overlap = visible_rows_of_scratch(links, coordinates)
+    w_seen, w_seen_joints, _, w_seen_overlap = visible_rows_of_scratch(links, coordinates)
     for s in range(surfaces.shape[0]):
         if surfaces[s, TELESCOPES] != 0:
             visible_links(
                 lanes, surfaces[s], strips, constants[LINKS_C:], scratch[S_SUMS : S_SUMS + 2],
-                scratch[w_seen:w_seen_overlap], scratch[w_seen_overlap:],
+                scratch[w_seen:w_seen_joints], scratch[w_seen_overlap:],
             )  # fmt: skip
             shares = scratch[w_seen_overlap:]
         else:
@@ -228,7 +228,7 @@ def accelerations(
     lane_product(lanes, operator, inputs, outputs)
     for s in range(surfaces.shape[0]):
         if surfaces[s, TELESCOPES] != 0:
-            rows, shares = scratch[w_seen:w_seen_overlap], scratch[w_seen_overlap:]
+            rows, shares = scratch[w_seen:w_seen_joints], scratch[w_seen_overlap:]
         else:
             rows, shares = constants[LINKS_C:], overlap
         for k in range(surfaces[s, LINKS]):

@@ -48,10 +48,11 @@ def gravity_rows_of_scratch(links: int) -> int:
 
 
 @inlined
-def visible_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int]:
-    """First scratch rows, at the scratch's end, of links and of overlap where surfaces telescope."""
+def visible_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int, int, int]:
+    """First scratch rows, where surfaces telescope, of links, joint stiffness and damping, and overlap."""
     first = joint_rows_of_scratch(links, coordinates)[-1]
-    return first, first + LINK_ROWS * links
+    stiffness = first + LINK_ROWS * links
+    return first, stiffness, stiffness + coordinates, stiffness + 2 * coordinates
 
 
 @inlined
