@@ -389,6 +389,21 @@ def drive_faults(surfaces: Sequence[Hinged]) -> Iterator[Fault]:
                 )
 
 
+def field_name(name: str, unit: str) -> str:
+    """Return the field of a drive's history in documents: `fold_left_rad`, `span_left_m`."""
+    return f"{name}_{unit}"
+
+
+def wrong_unit(drive: Drive, unit: str, pointer: str) -> Fault:
+    """Return the fault of a history whose unit is not that of its drive."""
+    return Fault(
+        "wrong_unit",
+        f"{drive.name!r} {'slides' if drive.unit == 'm' else 'turns'}, and its history is in {unit}.",
+        pointer,
+        f"Give it in {drive.unit}, and name the column {field_name(drive.name, drive.unit)}.",
+    )
+
+
 def label(name: str) -> str:
     """Return the display name of a drive: `fold left`."""
     return name.replace("_", " ")

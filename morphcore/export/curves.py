@@ -117,7 +117,7 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
 
 def drive_columns(document: Document) -> list[str]:
     """Names of the columns of a sample's or a flight's drives, as far as they exist."""
-    names = (f"{drive}_rad" for drive in document.get("drives", SWEEPS))
+    names = (f"{drive}_{unit}" for drive in document.get("drives", SWEEPS) for unit in ("rad", "m"))
     return [name for name in names if name in document]
 
 

@@ -50,11 +50,11 @@ KINK = 1e-9  # of an element: nearer to its ends, a kink of the surface's proper
 class FlexibleModel:
     """Beams, lattice and the connection between them.
 
-    compliances : (e, 3, 6, 6) what each Gauss point adds to an element's flexibility, (0, ...) if no surface
-    telescopes. roots, tips : (s,) first and last node of each surface. rest_W : (n, 3) nodes of the unbent surfaces from
+    roots, tips : (s,) first and last node of each surface. rest_W : (n, 3) nodes of the unbent surfaces from
     their root node, in W, m. riders : the lattice on sections; element, fraction : (k,) where these are
     (element -1 - i is node i itself). apparent : (n, 6, 6) apparent mass of the air at the nodes, kg and m;
-    (0, 6, 6) if the flight has none.
+    (0, 6, 6) if the flight has none. compliances : (e, 3, 6, 6) what each Gauss point adds to an element's
+    flexibility, (0, ...) if no surface telescopes.
     """
 
     aircraft: Aircraft
@@ -90,7 +90,7 @@ class FlexibleModel:
         return stiffness
 
     def at(self, angles: Array) -> FlexibleModel:
-        """The model with the lattice that it has at angles (h,) of all hinges: it slides as they telescope."""
+        """The model with the lattice that it has at angles (h,) of all hinges: it slides with their spans."""
         lattice = self.lattice.at(angles)
         if lattice is self.lattice:
             return self

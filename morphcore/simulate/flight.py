@@ -323,12 +323,17 @@ def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:
 def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
     """Write a trajectory with the columns of the example flights, SI units and radians.
 
+    Columns of drives that slide name their unit, ``span_left_m``.
+
     Cells are empty where a measured channel has a gap. `load_trajectory` reads it back.
     """
     measured = trajectory.channels
     columns = {
         "t": trajectory.time_s,
-        **{name: trajectory.drives[name] for name in trajectory.drive_order},
+        **{
+            trajectory.field_of(name) if trajectory.units.get(name) == "m" else name: trajectory.drives[name]
+            for name in trajectory.drive_order
+        },
         "phi": trajectory.phi,
         "theta": trajectory.theta,
         "psi": trajectory.psi,

@@ -15,6 +15,7 @@ from morphcore.simulate.schedule import Hold, Schedule, Tabulated, scheduled
 from morphcore.simulate.trajectory import Trajectory
 from morphdata import schedules as documents
 from morphdata.drive_keys import resolved, shown_names, unmeasured_sides
+from morphdata.drives import wrong_unit
 from morphdata.faults import Fault, refuse
 from morphdata.samples import columns_of_aircraft, no_drive
 
@@ -82,11 +83,19 @@ def followed_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -
         if drives and not flight.drives:
             faults = [no_drive(drives)]
     faults = faults or list(unmeasured_sides(keys, drives))
+    refuse(_at_field(fault, flight).under(pointer) for fault in faults)
     refuse(
-        replace(fault, pointer=f"{fault.pointer}_rad" if fault.pointer else "").under(pointer)
-        for fault in faults
+        wrong_unit(drives[name], flight.units[key], f"/{flight.field_of(key)}").under(pointer)
+        for name, key in keys.items()
+        if flight.units.get(key, drives[name].unit) != drives[name].unit
     )
     return {name: (key, Tabulated(flight.time_s, flight.drives[key])) for name, key in keys.items()}
+
+
+def _at_field(fault: Fault, flight: Trajectory) -> Fault:
+    """A fault at ``/key`` at the field of that key."""
+    key = fault.pointer.removeprefix("/")
+    return replace(fault, pointer=f"/{flight.field_of(key)}") if key else fault
 
 
 def moved_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> Trajectory:

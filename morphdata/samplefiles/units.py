@@ -61,12 +61,15 @@ TORQUE_UNITS = {  # -> N m
 UNIT_IN_BRACKETS = re.compile(r"(?P<name>.+?)_*[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]")
 
 
-def unit_pattern(units: Iterable[str]) -> re.Pattern[str]:
+def unit_pattern(units: Iterable[str], *, marked: bool = False) -> re.Pattern[str]:
     """A title with one of some units last, after a mark or in brackets.
 
-    All of ``theta_deg``, ``theta [deg]``, ``theta/deg``, ``theta, deg`` and ``theta in deg`` match.
+    All of ``theta_deg``, ``theta [deg]``, ``theta/deg``, ``theta, deg`` and ``theta in deg`` match; so does
+    ``thetadeg``, unless the unit must be ``marked``.
     """
     spelt = "|".join(map(re.escape, sorted(units, key=len, reverse=True)))
+    if marked:
+        return re.compile(rf"(?P<name>.+?)[_./,:;\[({{<-]+(?:in_)?_*(?P<unit>{spelt})_*[\])}}>]?")
     return re.compile(rf"(?P<name>.+?)[_./,:;-]*(?:in_)?[\[({{<]?_*(?P<unit>{spelt})_*[\])}}>]?")
 
 
