@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.kernels.loads import L_FAST_DECAY, L_SLOW_DECAY
+from morphcore.aero.kernels.loads import L_FAST_DECAY, L_SLOW_DECAY, TELESCOPES
 from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants
 from morphcore.models.kernels.layout import LINKS_C
+from morphcore.models.telescope import mouth_forces
 from morphcore.multibody.hinges import hinge_screws
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import shared_numbers
@@ -23,6 +24,8 @@ CHUNK = 64  # instants at a time: bounds the memory of the interpolated operator
 
 def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array) -> Array:
     """Torque of the hinge motors at every grid time, (steps + 1, h), N m along the positive angles.
+
+    Of a prismatic hinge it is the force of its drive along the extension, N.
 
     Inverse dynamics of the wings with their own accelerations and air loads at that instant; the hinges'
     accelerations are the schedule's (at its ends those of the morph, not of the adjacent rest). Columns are
@@ -75,6 +78,8 @@ def torques_and_rates(
             first_hinges, screws, operators, plan.wind_N[part], laid, states[part], zero, block, scratch,
             inputs, outputs, rates, out[part], velocity_rates[part],
         )  # fmt: skip
+    if model.surfaces[:, TELESCOPES].any():
+        out += mouth_forces(model, constants.rows[0], plan.angles, states)
     return out, velocity_rates
 
 
