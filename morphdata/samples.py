@@ -372,7 +372,7 @@ def load_sample(
     """
     path = Path(path)
     columns = read_flight(path, declared)
-    names = list(columns.drives)
+    names, units = list(columns.drives), dict(columns.units)
     if drives is not None:
         unreadable = {name: said_of(fault) for name, fault in columns.unreadable.items()}
         try:
@@ -382,11 +382,9 @@ def load_sample(
                 for fault in unmeasured_sides(followed, drives)
             )
             names = list(dict.fromkeys(followed.values()))
+            units = {key: drives[name].unit for name, key in followed.items()} | units
         except InvalidInput as error:
             raise InvalidInput(f"{path}: {error.message}", hint=error.hint) from None
-    units = dict(columns.units)
-    if drives is not None:
-        units = {key: drives[name].unit for name, key in followed.items()} | units
     angles = {name: columns.drives[name] for name in names}
     named = {name: columns.values[name] for name in ("t", "phi", "theta", "psi")} | angles
     return InlineSample.parse(

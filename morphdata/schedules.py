@@ -354,7 +354,8 @@ def load_schedules(path: str | Path) -> Schedules:
     """Read schedules from a file with the column t and a column for each drive that moves.
 
     A column is named after a drive, or after the word of a kind of hinge to move both sides together. Units
-    in the names are accepted (``t_ms``, ``fold_left_deg``); columns that are not drives of the aircraft are
+    in the names are accepted (``t_ms``, ``fold_left_deg``), and those of drives that slide are needed
+    (``span_m``); columns that are not drives of the aircraft are
     ignored, so that a sample flight is also a schedule. A drive without a column holds its angle.
 
     Raises
@@ -375,9 +376,11 @@ def load_schedules(path: str | Path) -> Schedules:
                 hint="sort the rows by time and drop repeated ones",
             )
     unreadable = {name: said_of(fault) for name, fault in table.unreadable.items()}
-    histories = {}
+    histories: dict[str, dict[str, Any]] = {}
     for name, angles in table.drives.items():
-        if max(map(abs, angles)) > HALF_TURN_RAD:
+        if table.units.get(name) == "m":
+            histories[name] = {"kind": "tabulated", "time_s": times, "extension_m": list(angles)}
+        elif max(map(abs, angles)) > HALF_TURN_RAD:
             row = next(row for row, angle in enumerate(angles) if abs(angle) > HALF_TURN_RAD)
             unreadable[name] = (
                 f"{place_in(path, table, row)}: {name} is {angles[row]:g} rad; if the column is in degrees, "

@@ -107,7 +107,9 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
         for name, flown in flights.items()
         for angle in ANGLE_COLUMNS
     }
-    optimum = dict.fromkeys(sorted(curves.get("drives", SWEEPS)), schedules["optimum"]["sweep_rad"])
+    slides = "extension_m" in schedules["optimum"]
+    names = [f"{name}_m" if slides else name for name in sorted(curves.get("drives", SWEEPS))]
+    optimum = dict.fromkeys(names, schedules["optimum"]["extension_m" if slides else "sweep_rad"])
     return {
         "schedule.csv": _table({"t": time_s, **optimum}, SCHEDULE_DIGITS),
         "schedules.csv": _table({"time_s": time_s, **all_schedules}, SCHEDULE_DIGITS),

@@ -41,7 +41,7 @@ def schedule_warnings(
         bench = case.flights("equivalent")
         motion = bench.motion(optimum)
         found += bending_warnings(bench.model.aircraft, bench.bending, "the trim", "/model")
-        first = path_angles(case.aircraft, case.drives, np.array([case.morph.initial_rad]))[0]
+        first = path_angles(case.aircraft, case.drives, np.array([case.morph.begin]))[0]
         found += wake_warnings(case.aircraft, first, bench.alpha_rad, "/aircraft/surfaces")
         found += air_warnings(case.flight, [("the optimum in the equivalent model", "/morph", motion)])
     found += light_wing_warnings(case.aircraft, case.flight)

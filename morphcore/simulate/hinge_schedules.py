@@ -49,6 +49,10 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules) -> Followed:
     if isinstance(schedules, documents.Schedules):
         moved = {key: scheduled(schedule) for key, schedule in schedules.given.items()}
         keys = schedules.keys_by_drive(aircraft.drives)
+        for name, key in keys.items():
+            unit, given = aircraft.drives[name].unit, schedules.given[key]
+            if given.unit != unit:
+                refuse([documents.unit_fault(name, unit, given, f"/schedules/{key}")])
         return {name: (key, moved[key]) for name, key in keys.items()}
     if not isinstance(schedules, Mapping):
         raise InvalidInput(
