@@ -27,6 +27,7 @@ from morphdata.vehicle import (
     flexible_wing_faults,
     model_surfaces_faults,
     moved_trim_faults,
+    sliding_faults,
     start_faults,
     trim_drive_faults,
 )
@@ -372,6 +373,7 @@ class OptimizeRequest(Request):
         """Check aircraft, model and morph together, and the size of the search."""
         yield from start_faults(self.flight, flown_with(self.model).start)
         yield from trim_drive_faults(self.aircraft, self.flight)
+        yield from sliding_faults(self.aircraft, self.flight)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
         yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
         yield from self._hinge_faults()

@@ -21,7 +21,13 @@ from morphdata.options import MODEL, OUTPUT, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS
 from morphdata.schedules import EXAMPLE_SCHEDULE, Schedules
-from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults, trim_drive_faults
+from morphdata.vehicle import (
+    flexible_wing_faults,
+    model_surfaces_faults,
+    sliding_faults,
+    start_faults,
+    trim_drive_faults,
+)
 from morphdata.warnings import Warnings
 
 DEFAULT_ELEMENTS = 10
@@ -117,6 +123,7 @@ class SimulateRequest(Request):
         """Check that the flight can start, its drives stay in range, and its length is permitted."""
         yield from start_faults(self.flight, flown_with(self.model).start)
         yield from trim_drive_faults(self.aircraft, self.flight)
+        yield from sliding_faults(self.aircraft, self.flight)
         yield from self.schedules.drive_faults(self.aircraft.drives)
         if not MIN_ROWS <= self.rows <= MAX_ROWS:
             yield Fault(

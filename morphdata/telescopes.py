@@ -82,6 +82,16 @@ def mouth_m(surface: Sliding) -> float | None:
     )
 
 
+def apparent_mass_fault(name: str) -> Fault:
+    """Return the fault of a flight whose apparent mass would have to follow the visible span of a surface."""
+    return Fault(
+        "not_supported",
+        f"The apparent mass of {name!r}, which telescopes, is not supported.",
+        "/flight/apparent_mass",
+        "Leave it out; it matters for light wings.",
+    )
+
+
 def telescope_faults(surface: Sliding) -> Iterator[Fault]:
     """Check that a telescoping surface stays in its mouth, keeps a visible part, and bears no controls."""
     mouth = mouth_m(surface)

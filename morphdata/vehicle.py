@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import islice
 from typing import TypeVar
 
 from morphdata.aircraft import Aircraft
@@ -10,6 +11,7 @@ from morphdata.drives import without_side
 from morphdata.faults import Fault
 from morphdata.flight import Flight
 from morphdata.parameters import Parameters
+from morphdata.telescopes import apparent_mass_fault, mouth_m
 
 T = TypeVar("T")
 
@@ -41,6 +43,22 @@ def trim_drive_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
             "/flight/trim_drive",
             f"Its drives are {', '.join(drives)}." if drives else "It has no drives: omit trim_drive.",
         )
+    elif name is not None:
+        for drive in drives.values():
+            if name in (drive.name, without_side(drive.name)) and drive.unit != "rad":
+                yield Fault(
+                    "no_such_drive",
+                    f"The drive {drive.name!r} slides, and a trim turns its drive.",
+                    "/flight/trim_drive",
+                    "Trim with a drive that turns, or omit trim_drive.",
+                )
+
+
+def sliding_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
+    """Check that nothing is asked of telescoping surfaces that is not computed."""
+    if flight.apparent_mass:
+        names = (each.name for each in aircraft.surfaces if mouth_m(each) is not None)
+        yield from map(apparent_mass_fault, islice(names, 1))
 
 
 def moved_trim_faults(flight: Flight, start: str | None, moved: Sequence[str]) -> Iterator[Fault]:

@@ -19,13 +19,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.geometry.surface import Surface
+from morphdata.faults import refuse
+from morphdata.telescopes import apparent_mass_fault
 
 Array = NDArray[np.float64]
 
 # four points integrate b^4 and b^2 y^2 of a linear taper exactly
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(4)
 NORMAL_MOTION = (0, 1, 5)  # omega_x, omega_y, v_z among the rows of a twist
+
+
+def refuse_apparent_mass(aircraft: Aircraft, flight: Flight) -> None:
+    """Refuse the apparent mass of surfaces that telescope: it would have to follow their visible span.
+
+    Raises
+    ------
+    InvalidInput : the flight has apparent mass, and a surface telescopes.
+    """
+    names = (surface.name for surface in aircraft.surfaces if surface.mouth_m is not None)
+    refuse(map(apparent_mass_fault, names if flight.apparent_mass else ()))
 
 
 def apparent_inertia(

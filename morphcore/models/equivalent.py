@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.aero.apparent_mass import refuse_apparent_mass
 from morphcore.aero.kernels.loads import L_MOMENT, LINKS, PAIR0, STRIPS, TELESCOPES
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.aero.vlm import prandtl_glauert
@@ -304,6 +305,7 @@ def chain_model(
     links = whole_number(
         links_per_wing, "links_per_wing", pointer="/model/links_per_wing", minimum=1, maximum=MAX_LINKS
     )
+    refuse_apparent_mass(aircraft, flight)
     steep = lift_coefficient(aircraft, flight) > STEEP_LIFT
     return _chain_model(aircraft, flight, links, lattice, steep=steep)
 

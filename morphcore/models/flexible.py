@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.apparent_mass import apparent_inertia, spatial
+from morphcore.aero.apparent_mass import apparent_inertia, refuse_apparent_mass, spatial
 from morphcore.aero.kernels.loads import JONES_B1, JONES_B2
 from morphcore.aero.moving_lattice import Riders
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
@@ -113,6 +113,7 @@ def flexible_model(
     InvalidInput : the number of elements is out of range.
     """
     elements = whole_number(elements, "elements", pointer="/model/elements", minimum=1, maximum=MAX_ELEMENTS)
+    refuse_apparent_mass(aircraft, flight)
     parts = aircraft_lattice(aircraft, lattice)
     ends: list[list[int]] = []
     rest, sections, damping = [], [], []
