@@ -93,6 +93,13 @@ CHANNELS: list[ChannelFacts] = [
         per="drive",
         models=CHAINS,
     ),
+    ChannelFacts(
+        "drive_force",
+        "N",
+        "Force of the motors of a drive that slides, along its extension.",
+        per="drive",
+        models=CHAINS,
+    ),
 ]
 
 

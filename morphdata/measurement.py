@@ -15,7 +15,7 @@ from morphdata.options import MEASUREMENT, Option
 ANGLES = ("phi", "theta", "psi")
 ANGLE_COLUMNS = tuple(f"{name}_rad" for name in ANGLES)  # as files and documents call them
 # they start anew with every simulated flight, or say nothing that the drives cause
-UNFITTED = ("vx", "vy", "x", "y", "z", "hinge_torque")
+UNFITTED = ("vx", "vy", "x", "y", "z", "hinge_torque", "drive_force")
 MAX_CHANNELS = 64
 
 Loss = Literal["linear", "huber", "soft_l1"]
@@ -79,7 +79,7 @@ class Measurement(Document):
                     f"/channels/{name}",
                     "Channels are phi, theta, psi and those of simulated flights: p, q, r, tip_left_z, ...",
                 )
-            elif name in UNFITTED or name.startswith("hinge_torque_"):
+            elif name in UNFITTED or name.startswith(("hinge_torque_", "drive_force_")):
                 yield Fault(
                     "channel_not_fitted",
                     f"The channel {name} cannot be fitted.",

@@ -146,7 +146,8 @@ class ScheduleResult(Shown):
             ]
         if self.notes:
             document["notes"] = list(self.notes)
-        return named_in(self.morph.unit, document) | {"morph": self.morph.model_dump(exclude_none=True)}
+        named: Document = named_in(self.morph.unit, document)
+        return named | {"morph": self.morph.model_dump(exclude_none=True)}
 
     def curves(self) -> Document:
         """Time histories for plots and tables: the schedules and the attitude in every model."""

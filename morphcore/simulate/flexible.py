@@ -30,12 +30,12 @@ from morphcore.multibody.beam import (
     carried,
     expand_solution,
     factor,
-    helix_series,
     node_forces,
     reduce_right,
 )
 from morphcore.multibody.hinges import hinge_screws, relative_motion
 from morphcore.multibody.kernels.beam import apparent_forces
+from morphcore.multibody.kernels.helix import helix_series
 from morphcore.simulate.control_motion import control_angles, deflections
 from morphcore.simulate.kernels.flexible_step import (
     FLOWN,

@@ -161,9 +161,9 @@ def scheduled(document: documents.AnySchedule) -> Schedule:
     if document.kind == "hold":
         return Hold(*values)
     if document.kind == "constant_rate":
-        return ConstantRate(*values, document.morph_s, document.start_s, document.ramp_s)
+        return ConstantRate(values[0], values[1], document.morph_s, document.start_s, document.ramp_s)
     if document.kind == "quadratic":
-        return Quadratic(*values, document.duration_s, document.start_s)
+        return Quadratic(values[0], values[1], document.duration_s, document.start_s)
     if document.kind == "spline":
         return Spline(np.array(document.knot_time_s), np.array(values))
     return Tabulated(np.array(document.time_s), np.array(values))
