@@ -309,7 +309,11 @@ def _section_places(
     place = distance / surface.length_m * elements
     inside = np.minimum(np.floor(place + 1e-12), elements - 1)
     origin_W = distance[:, None] * np.array([0.0, surface.span_sign, 0.0])
-    return first_element + inside.astype(np.int64), place - inside, origin_W
+    element, fraction = first_element + inside.astype(np.int64), place - inside
+    if surface.mouth_m is not None:
+        # up to the mouth the panel is straight: its visible root leaves no gap to the inner panel
+        element[0], fraction[0], origin_W[0] = -1 - root, 0.0, 0.0
+    return element, fraction, origin_W
 
 
 def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Array) -> Riders:

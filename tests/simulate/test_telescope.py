@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from morphcore import simulate
+from morphcore import optimise_schedule, simulate
 from morphcore.aero.operator import aircraft_lattice, lattice_operator
 from morphcore.frames import rotation_from_quaternion
 from morphcore.geometry.aircraft import Aircraft, Flight
@@ -22,6 +22,7 @@ from morphcore.simulate.schedule import Spline
 from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.torque import hinge_torques
 from morphdata.lattice import Lattice
+from morphdata.optimize import Limits, Morph, OptimizeResult, ScheduleSearch
 from tests.models.chains import airless
 from tests.simulate.flights import fly_free
 from tests.simulate.telescoped import (
@@ -267,3 +268,29 @@ def replace_held(document, extension_m):
         for each in document["surfaces"]
     ]
     return {**document, "surfaces": surfaces}
+
+
+def test_a_morph_in_metres_is_optimised_under_limits_in_metres():
+    """The result names extensions, rates and forces; its schedule keeps the limits and flies."""
+    document = telescoped(flexible=True)
+    guess = physical_guess(chain_model(Aircraft.of(document), Flight.of(FLIGHT), 2, COARSE))
+    found = optimise_schedule(
+        document,
+        FLIGHT,
+        guess,
+        morph=Morph(final_m=0.5, duration_s=0.8, knots=3, settle_s=0.2),
+        limits=Limits(max_rate_m_s=1.2, max_drive_force_n=1e4),
+        search=ScheduleSearch(particles=2, generations=1),
+        verify="none",
+        lattice=COARSE,
+    ).to_document()
+    OptimizeResult(**found)
+    assert found["schedule"]["knot_extension_m"][-1] == 0.5
+    assert "knot_angle_rad" not in found["schedule"]
+    assert found["limits"]["max_rate_m_s"] == 1.2
+    assert 0.6 < found["reached"]["optimum"]["max_rate_m_s"] <= 1.2
+    assert 0.0 < found["reached"]["optimum"]["max_drive_force_n"] < 1e4
+    schedule = {"span": found["schedules"]["optimum"]}
+    flown = simulate(document, FLIGHT, schedule, model=guess, duration_s=1.0, channels=["drive_force"])
+    assert flown.trajectory.drives["span_left"][-1] == pytest.approx(0.5)
+    assert np.abs(flown.trajectory.extra["drive_force_span_left"]).max() > 1.0
