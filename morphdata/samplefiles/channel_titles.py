@@ -8,6 +8,7 @@ from morphdata.channels import ChannelFacts, channel_of
 from morphdata.samplefiles.units import (
     ACCELERATION_UNITS,
     ANGLE_UNITS,
+    FORCE_UNITS,
     LENGTH_UNITS,
     RATE_UNITS,
     SPEED_UNITS,
@@ -24,6 +25,7 @@ FACTORS = {  # SI unit of a channel -> units that its columns may be in, and the
     "m": LENGTH_UNITS,
     "m/s^2": ACCELERATION_UNITS,
     "N m": TORQUE_UNITS,
+    "N": FORCE_UNITS,
     "1": {"1": 1.0, "-": 1.0, "g": 1.0},
 }
 PATTERNS = {unit: unit_pattern(factors) for unit, factors in FACTORS.items()}

@@ -54,6 +54,10 @@ ACCELERATION_UNITS = {  # -> m/s^2
     "g": STANDARD_GRAVITY_M_S2,
     "mg": 1e-3 * STANDARD_GRAVITY_M_S2,
 }
+FORCE_UNITS = {  # -> N
+    **dict.fromkeys(("n", "newton", "newtons"), 1.0),
+    "kn": 1e3,
+}
 TORQUE_UNITS = {  # -> N m
     **dict.fromkeys(("nm", "n_m", "n*m", "n.m", "n·m"), 1.0),
     **dict.fromkeys(("knm", "kn_m", "kn*m", "kn.m"), 1e3),

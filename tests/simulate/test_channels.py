@@ -66,7 +66,7 @@ def test_both_lists_hold_the_same_channels() -> None:
     """What documents know is what can be computed, in the same order; units are one of few."""
     assert [channel.name for channel in CHANNELS] == EVERY
     assert len(set(EVERY)) == len(EVERY)
-    assert {channel.unit for channel in CHANNELS} == {"rad/s", "m/s", "m", "rad", "m/s^2", "1", "N m"}
+    assert {channel.unit for channel in CHANNELS} == {"rad/s", "m/s", "m", "rad", "m/s^2", "1", "N m", "N"}
 
 
 def test_the_page_on_formats_lists_them(root: Path) -> None:
