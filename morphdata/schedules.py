@@ -20,7 +20,7 @@ from pydantic_core import PydanticCustomError
 
 from morphdata.base import Angle, Document
 from morphdata.drive_keys import resolved
-from morphdata.drives import SWEEPS, Drive, Unit
+from morphdata.drives import SWEEPS, Drive, Unit, field_name
 from morphdata.extensions import (
     EXTENSION_FIELDS,
     ExtensionSchedule,
@@ -298,14 +298,13 @@ def unit_fault(name: str, unit: Unit, schedule: AnySchedule, pointer: str) -> Fa
     """Return the fault of a schedule in another unit than that of its drive."""
     _, place = next(schedule.named)
     field = place.partition("/")[0]
-    words = {"rad": ("angle", "rad"), "m": ("extension", "m")}
-    (wrong, _), (right, end) = words[schedule.unit], words[unit]
-    meant = f"{field.removesuffix(f'_{schedule.unit}').replace(wrong, right)}_{end}"
+    words = {"rad": "angle", "m": "extension"}
+    stem = field.removesuffix(f"_{schedule.unit}").replace(words[schedule.unit], words[unit])
     return Fault(
         "wrong_unit",
         f"The drive {name!r} {'slides' if unit == 'm' else 'turns'}, and {field} is in {schedule.unit}.",
         f"{pointer}/{place}",
-        f"Give its history in {unit}: {meant}.",
+        f"Give its history in {unit}: {stem}_{unit}; in a file, name the column {field_name(name, unit)}.",
     )
 
 
