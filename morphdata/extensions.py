@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import FailFast, Field
 
@@ -149,3 +149,15 @@ ExtensionSchedule = (
     HeldExtension | ConstantRateExtension | QuadraticExtension | SplineExtension | TabulatedExtension
 )
 EXTENSION_FIELDS = ("extension_m", "initial_m", "final_m", "rate_m_s", "knot_extension_m")
+# limits of drives that turn, and those of drives that slide
+SLIDING_LIMITS = {
+    "max_rate_rad_s": "max_rate_m_s",
+    "max_accel_rad_s2": "max_accel_m_s2",
+    "max_hinge_torque_nm": "max_drive_force_n",
+}
+
+
+def knot_values(schedule: Mapping[str, Any]) -> list[float]:
+    """Return the angles, rad, or extensions, m, at the knots of a found schedule."""
+    slid = schedule.get("knot_extension_m")
+    return list(schedule["knot_sweep_rad"] if slid is None else slid)

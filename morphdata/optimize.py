@@ -16,6 +16,7 @@ from morphdata.controls import unmotorised
 from morphdata.drive_keys import resolved, shown_names
 from morphdata.drives import Drive, Extension, Unit, wrong_unit
 from morphdata.execution import Request
+from morphdata.extensions import SLIDING_LIMITS
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import OWN_OR_CHOSEN, Lattice, StepS
@@ -256,14 +257,6 @@ class Limits(Document):
         return 2.0 * math.sqrt(change / accel)
 
 
-# limits of drives that turn, and those of drives that slide
-SLIDING_LIMITS = {
-    "max_rate_rad_s": "max_rate_m_s",
-    "max_accel_rad_s2": "max_accel_m_s2",
-    "max_hinge_torque_nm": "max_drive_force_n",
-}
-
-
 class Weights(Document):
     """Weights of the squared departures of roll, pitch and yaw in the objective."""
 
@@ -456,12 +449,6 @@ class FoundSchedule(Result):
     knot_extension_m: list[float] | None = Field(
         default=None, description="Extensions at the knots of a drive that slides, instead of the angles."
     )
-
-
-def knot_values(schedule: Mapping[str, Any]) -> list[float]:
-    """Return the angles, rad, or extensions, m, at the knots of a `FoundSchedule`."""
-    slid = schedule.get("knot_extension_m")
-    return list(schedule["knot_sweep_rad"] if slid is None else slid)
 
 
 class KeptLimits(Result):

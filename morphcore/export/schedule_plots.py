@@ -30,7 +30,7 @@ from morphcore.export.figure import (
     stack,
     time_axis,
 )
-from morphdata.optimize import knot_values
+from morphdata.extensions import knot_values
 
 # Okabe & Ito's colours, also distinguished by line style
 STYLES: dict[str, dict[str, Any]] = {

@@ -13,8 +13,9 @@ from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
 from morphdata.controls import unmotorised
 from morphdata.drives import wrong_unit
+from morphdata.extensions import SLIDING_LIMITS
 from morphdata.faults import refuse
-from morphdata.optimize import SLIDING_LIMITS, Limits, Morph
+from morphdata.optimize import Limits, Morph
 
 OVERSHOOT = 0.5  # of the change: how far a schedule that may reverse may go beyond either end
 USUAL_RAMP_S = 0.1  # ramps of a constant-rate schedule where the limits allow them, as in the sample flights

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from morphdata.drives import Unit
-from morphdata.optimize import SLIDING_LIMITS
+from morphdata.extensions import SLIDING_LIMITS
 
 SLIDING_NAMES = {
     **SLIDING_LIMITS,

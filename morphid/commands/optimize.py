@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from morphdata.drives import SWEEPS, label
-from morphdata.optimize import knot_values
+from morphdata.extensions import knot_values
 from morphid.commands import options
 from morphid.commands.operation import Particulars, Values
 from morphid.files import writing
