@@ -43,6 +43,7 @@ from morphcore.aero.kernels.loads import (
     INBOARD,
     MORE_OUTPUTS,
     OUTPUTS,
+    SLIDING_COLUMNS,
     STRIP_COLUMNS,
 )
 from morphcore.aero.vlm import RingTable, influence, ring_table
@@ -168,9 +169,9 @@ class AircraftLattice:
 class LatticeOperator:
     """One reduced operator.
 
-    matrix : (rows, columns) as ``operator_shape``. strips : (strips, STRIP_COLUMNS), columns as listed in
-    aero/kernels/loads.py. controls : (rows, m) columns of the parts of the controls, `ControlSlopes`, for
-    unit deflection; see `AircraftLattice.control_columns`.
+    matrix : (rows, columns) as ``operator_shape``. strips : (strips, STRIP_COLUMNS) or, where a surface
+    telescopes, SLIDING_COLUMNS more, as listed in aero/kernels/loads.py. controls : (rows, m) columns of the
+    parts of the controls, `ControlSlopes`, for unit deflection; see `AircraftLattice.control_columns`.
     """
 
     matrix: Array
@@ -309,7 +310,8 @@ def _reduced(
     uniform_flows : of `_uniform_flows`, in which a surface has its chordwise distribution of circulation.
     """
     motions = 2 * lattice.strips
-    strips = np.zeros((lattice.strips, STRIP_COLUMNS))
+    slides = any(surface.mouth_m is not None for surface in lattice.aircraft.surfaces)
+    strips = np.zeros((lattice.strips, STRIP_COLUMNS + SLIDING_COLUMNS * slides))
     inputs = circulation.shape[1]
     loads = np.zeros((lattice.operator_shape[0], inputs))
     ring, side0 = 0, lattice.rings
@@ -346,7 +348,7 @@ def _reduced(
                 ) - edges.summed(on_edges[2], front * edges.front[..., 0], side * edges.side[..., 0])
             loads[more + 1] = edges.moment(on_edges[0])
         own = strips[strip0 : strip0 + part.spanwise]
-        own[:] = edges.columns(surface.chord_W)
+        own[:, :STRIP_COLUMNS] = edges.columns(surface.chord_W)
         if surface.mouth_m is not None:
             own[:, INBOARD : AREA_CHORD + 1] = strip_areas(surface, part)
     matrix = np.zeros(lattice.operator_shape)
@@ -401,7 +403,7 @@ class _Edges:
 
     def columns(self, chord_W: Array) -> Array:
         """Columns (spanwise, STRIP_COLUMNS) of the strips."""
-        out = np.zeros((self.width.size, STRIP_COLUMNS))
+        out = np.empty((self.width.size, STRIP_COLUMNS))
         middle_x = 0.5 * (self.corners[:, :, 0, 0] + self.corners[:, :, 1, 0])
         trailing = self.sign * (self.corners[-1, :, 1] - self.corners[-1, :, 0]) / self.width[:, None]
         out[:, EDGE_X] = middle_x[-1]

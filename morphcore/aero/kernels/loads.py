@@ -35,10 +35,11 @@ OUTPUTS, MORE_OUTPUTS = 5, 3
 # m: middle of the trailing edge, x of the centre of circulation; the trailing edge, in the sense of the
 # lifting circulation, per width of the strip; unit vector of the chord, forward, and its y over x
 EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y, CHORD_SLOPE = 0, 1, 2, 3, 4, 5, 6, 7
-# of surfaces that telescope, otherwise 0: ends of the strip, m from the root along the axis; area weighted by
-# the share of the profile drag, m^2; integral of the chord squared, m^3
+STRIP_COLUMNS = 8
+# where a surface telescopes, further columns, 0 on others: ends of the strip, m from the root along the axis;
+# area weighted by the share of the profile drag, m^2; integral of the chord squared, m^3
 INBOARD, OUTBOARD, AREA, AREA_CHORD = 8, 9, 10, 11
-STRIP_COLUMNS = 12
+SLIDING_COLUMNS = 4
 # rows of a link's constants after its mass properties: drag area (m^2) and its y (m); of the slow and of the
 # fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
 # forward); slope of the sections (twist less zero-lift angle) at the link's origin, and its growth along y
