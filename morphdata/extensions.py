@@ -157,6 +157,12 @@ SLIDING_LIMITS = {
 }
 
 
+def limits_of(unit: Unit) -> str:
+    """Return the names of the limits of rate and acceleration of drives of a unit, for messages."""
+    rate, acceleration = list(SLIDING_LIMITS if unit == "rad" else SLIDING_LIMITS.values())[:2]
+    return f"{rate} or {acceleration}"
+
+
 def knot_values(schedule: Mapping[str, Any]) -> list[float]:
     """Return the angles, rad, or extensions, m, at the knots of a found schedule."""
     slid = schedule.get("knot_extension_m")

@@ -16,7 +16,7 @@ from morphdata.controls import unmotorised
 from morphdata.drive_keys import resolved, shown_names
 from morphdata.drives import Drive, Extension, Unit, wrong_unit
 from morphdata.execution import Request
-from morphdata.extensions import SLIDING_LIMITS
+from morphdata.extensions import SLIDING_LIMITS, limits_of
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import OWN_OR_CHOSEN, Lattice, StepS
@@ -279,7 +279,7 @@ def goal_faults(morph: Morph, limits: Limits) -> Iterator[Fault]:
             "missing",
             f"Without a limit the goal {morph.goal!r} has no shortest duration.",
             "/limits",
-            "Give max_rate_rad_s or max_accel_rad_s2.",
+            f"Give {limits_of(morph.unit)}.",
         )
 
 
@@ -416,7 +416,7 @@ class OptimizeRequest(Request):
                 "morph_too_short",
                 f"Within the limits the motion takes more than {morph.duration_s:g} s.",
                 "/morph/duration_s",
-                f"Give more than {min_s:.4g} s, or raise the limits of rate and acceleration.",
+                f"Give more than {min_s:.4g} s, or raise {limits_of(morph.unit)} in limits.",
             )
         yield from goal_faults(morph, limits)
 
