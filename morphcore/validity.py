@@ -96,7 +96,7 @@ def air_motion(
     air_B = np.einsum("kij,ki->kj", R_NB, air_N)
     alpha = np.arctan2(air_B[:, 2], air_B[:, 0])
     airspeed = np.asarray(np.linalg.norm(air_N, axis=1))
-    across = np.array([hinge.axis_B[1] for hinge in aircraft.hinges])
+    across = np.array([0.0 if hinge.prismatic else hinge.axis_B[1] for hinge in aircraft.hinges])
     inclined = []
     for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True):
         root = surface.incidence_rad * np.cos(surface.dihedral_rad) + angles[:, own] @ across[own]
@@ -367,7 +367,8 @@ def trim_warnings(
 
 
 def _pitching_drives(aircraft: Aircraft) -> list[str]:
-    able = {hinge.drive: None for hinge in aircraft.hinges if abs(hinge.axis_B[1]) > INCIDENCE_AXIS}
+    turning = (hinge for hinge in aircraft.hinges if not hinge.prismatic)
+    able = {hinge.drive: None for hinge in turning if abs(hinge.axis_B[1]) > INCIDENCE_AXIS}
     opposed = {without_side(control.drive) for control in aircraft.controls if control.sign < 0.0}
     for surface in aircraft.surfaces:
         if abs(surface.dihedral_rad) < UPRIGHT_RAD:

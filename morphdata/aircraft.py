@@ -30,6 +30,7 @@ from morphdata.stations import (
     row_chords,
     station_faults,
 )
+from morphdata.telescopes import telescope_faults
 
 MAX_SURFACES = 16
 
@@ -300,6 +301,7 @@ class Surface(Document):
                 "Add a hinge, or position_m for a fixed surface.",
             )
         yield from overlap_faults(self.all_controls)
+        yield from telescope_faults(self)
 
 
 class Aircraft(Document):

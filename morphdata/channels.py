@@ -103,6 +103,13 @@ CHANNELS: list[ChannelFacts] = [
         fitted=False,
     ),
     ChannelFacts(
+        "drive_force",
+        "N",
+        "Force of the motors of a drive that slides, along its extension.",
+        per="drive",
+        fitted=False,
+    ),
+    ChannelFacts(
         "root_shear",
         "N",
         "Force of the loads on the surface, upward along -z of its root's axes.",

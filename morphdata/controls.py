@@ -16,8 +16,9 @@ from morphdata.drives import (
     SIDES,
     Drive,
     Hinge,
+    Moved,
     OfSide,
-    Turned,
+    Unit,
     drive_name,
     drives_of,
     range_faults,
@@ -87,6 +88,26 @@ class Control(_Stretch):
         """Outboard end, share of the span."""
         return float(getattr(self, "to"))  # noqa: B009 - declared by `create_model`
 
+    @property
+    def low(self) -> float:
+        """Smallest angle, rad."""
+        return self.min_rad
+
+    @property
+    def high(self) -> float:
+        """Largest angle, rad."""
+        return self.max_rad
+
+    @property
+    def held(self) -> float:
+        """Angle held if no history is given, rad."""
+        return self.angle_rad
+
+    @property
+    def unit(self) -> Unit:
+        """Of its history."""
+        return "rad"
+
     def sign(self, side: str) -> float:
         """+1 if a positive angle moves the trailing edge of a surface on a given side down, else -1."""
         return -1.0 if self.mirror == "antisymmetric" and side == "left" else 1.0
@@ -134,7 +155,7 @@ def control_names(surfaces: Sequence[Controlled]) -> dict[tuple[int, int], str]:
     }
 
 
-def control_drives(controls: Iterable[tuple[str, OfSide, tuple[int, int], Turned]]) -> dict[str, Drive]:
+def control_drives(controls: Iterable[tuple[str, OfSide, tuple[int, int], Moved]]) -> dict[str, Drive]:
     """Return the drives of controls, by name; arguments as of `morphdata.drives.drives_of`."""
     return {
         name: replace(drive, hinges=(), controls=drive.hinges) for name, drive in drives_of(controls).items()

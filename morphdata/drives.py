@@ -16,7 +16,9 @@ from morphdata.samplefiles.titles import ATTITUDE
 
 HINGE_RANGE_RAD = 1.3  # rad in either direction, if a hinge has no range
 MAX_HINGES = 4  # of one surface
+MAX_EXTENSION_M = 100.0
 WORDS = {"x": "fold", "y": "incidence", "z": "sweep"}  # words of hinges without a name
+SPAN = "span"  # that of a prismatic hinge along the span
 SIDES = ("left", "right")
 BOTH = "both"
 SWEEPS = tuple(f"{WORDS['z']}_{side}" for side in SIDES)
@@ -25,13 +27,23 @@ RESERVED = frozenset({"time", *ATTITUDE, BOTH, *SIDES})
 SAME_AXIS = 1e-9  # distance between two unit vectors
 ANGLE_TOLERANCE_RAD = 1e-6  # measured angles are not exactly zero
 
+ROTARY_FIELDS, SLIDING_FIELDS = ("min_rad", "max_rad", "angle_rad"), ("min_m", "max_m", "extension_m")
+
 Side = Literal["right", "left"]
+Unit = Literal["rad", "m"]
+Extension = Annotated[float, Field(ge=-MAX_EXTENSION_M, le=MAX_EXTENSION_M)]
 Vector = tuple[float, float, float]
 Component = Annotated[float, Field(ge=-1e3, le=1e3)]
 
 
 class Hinge(Document):
-    """A revolute joint with prescribed motion: z sweeps, x folds, y changes incidence, a vector is free."""
+    """A joint with prescribed motion: z sweeps, x folds, y changes incidence, a vector is free.
+
+    A prismatic one slides, along the surface's own span unless its axis says otherwise. If it is the last
+    hinge of a surface and slides along its span, its position is the mouth of the panel in which the surface
+    is hidden as far as its root lies inboard of it: only the part outboard of the mouth has air loads, all of
+    it has mass.
+    """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")] | None = Field(
         default=None,
@@ -42,12 +54,19 @@ class Hinge(Document):
         description="From the fuselage reference point, body axes (forward, right, down), where no hinge has "
         "moved."
     )
-    axis: Literal["x", "y", "z"] | Annotated[list[Component], Field(min_length=3, max_length=3)] = Field(
-        description="A letter turns mirror images alike: a positive angle moves the tip aft (z) or up (x), "
-        "or the nose up (y). A vector in body axes, of any length, is turned about by the right-hand rule; "
-        "the mirror image of [x, y, z] is [-x, y, -z]."
+    axis: Literal["x", "y", "z"] | Annotated[list[Component], Field(min_length=3, max_length=3)] | None = (
+        Field(
+            default=None,
+            description="A letter turns mirror images alike: a positive angle moves the tip aft (z) or up "
+            "(x), or the nose up (y). A vector in body axes, of any length, is turned about by the "
+            "right-hand rule; the mirror image of [x, y, z] is [-x, y, -z]. A prismatic hinge needs none to "
+            "slide along the surface's span; x, y, z slide it forward, outward, down, a vector along itself "
+            "(mirror image: [x, -y, z]).",
+        )
     )
-    kind: Literal["revolute"] = "revolute"
+    kind: Literal["revolute", "prismatic"] = Field(
+        default="revolute", description="`prismatic`: it slides, and its history is in m."
+    )
     min_rad: Angle = Field(
         default=-HINGE_RANGE_RAD, description="Smallest angle; samples beyond it are refused."
     )
@@ -55,16 +74,57 @@ class Hinge(Document):
         default=HINGE_RANGE_RAD, description="Largest angle; samples beyond it are refused."
     )
     angle_rad: Angle = Field(default=0.0, description="Angle held if no history is given.")
+    min_m: Extension | None = Field(
+        default=None, description="Of a prismatic hinge: smallest extension, default 0."
+    )
+    max_m: Extension | None = Field(default=None, description="Of a prismatic hinge: largest extension.")
+    extension_m: Extension | None = Field(
+        default=None, description="Of a prismatic hinge: extension held if no history is given, default 0."
+    )
+
+    @property
+    def is_prismatic(self) -> bool:
+        """Whether it slides."""
+        return self.kind == "prismatic"
+
+    @property
+    def unit(self) -> Unit:
+        """Of its history."""
+        return "m" if self.is_prismatic else "rad"
+
+    @property
+    def low(self) -> float:
+        """Smallest angle or extension, rad or m."""
+        return self.min_m or 0.0 if self.is_prismatic else self.min_rad
+
+    @property
+    def high(self) -> float:
+        """Largest angle or extension, rad or m."""
+        return self.max_m or 0.0 if self.is_prismatic else self.max_rad
+
+    @property
+    def held(self) -> float:
+        """Angle or extension held if no history is given, rad or m."""
+        return self.extension_m or 0.0 if self.is_prismatic else self.angle_rad
 
     @property
     def word(self) -> str | None:
         """Name without the side; None for an unnamed hinge about a vector."""
+        if self.is_prismatic:
+            return self.name or (SPAN if self.axis in (None, "y") else None)
         return self.name or (WORDS[self.axis] if isinstance(self.axis, str) else None)
 
-    def axis_B(self, side: str) -> Vector:
-        """Unit vector in body axes about which a positive angle turns a surface on a given side."""
+    def axis_B(self, side: str, line_B: Vector | None = None) -> Vector:
+        """Unit vector in body axes about which (or along which) it moves a surface on a given side.
+
+        line_B : that of the surface's span, outward, along which a prismatic hinge without an axis slides.
+        """
+        sign = 1.0 if side == "right" else -1.0
+        if self.axis is None:
+            return line_B or (0.0, sign, 0.0)
         if isinstance(self.axis, str):
-            sign = 1.0 if side == "right" else -1.0
+            if self.is_prismatic:
+                return {"x": (1.0, 0.0, 0.0), "y": (0.0, sign, 0.0), "z": (0.0, 0.0, 1.0)}[self.axis]
             return {"x": (-sign, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, sign)}[self.axis]
         x, y, z = self.axis
         length = math.hypot(x, y, z)
@@ -72,7 +132,14 @@ class Hinge(Document):
 
     def faults(self) -> Iterator[Fault]:
         """Check that the axis has a direction, the range a width, and that it contains the held angle."""
-        if not isinstance(self.axis, str):
+        if self.axis is None and not self.is_prismatic:
+            yield Fault(
+                "missing",
+                "The hinge has no axis.",
+                "/axis",
+                "Give x (fold), y (incidence), z (sweep) or a vector; only a prismatic hinge needs none.",
+            )
+        if isinstance(self.axis, list):
             if not any(self.axis):
                 yield Fault(
                     "axis_zero", "The axis has no direction.", "/axis", "Give x, y, z or a vector, not zero."
@@ -84,24 +151,57 @@ class Hinge(Document):
                     "/name",
                     'Name its drive, for example "cant"; only x, y and z have default names.',
                 )
-        yield from range_faults("hinge", self.min_rad, self.max_rad, self.angle_rad)
+        elif self.is_prismatic and self.word is None:
+            yield Fault(
+                "missing",
+                f"A hinge that slides along {self.axis} needs a name.",
+                "/name",
+                'Name its drive, for example "shift"; only one along the span has a default name.',
+            )
+        yield from self._unit_faults()
+
+    def _unit_faults(self) -> Iterator[Fault]:
+        """Check that range and held value are in the unit of the hinge's kind, and sound."""
+        of_other = ROTARY_FIELDS if self.is_prismatic else SLIDING_FIELDS
+        fields = type(self).model_fields
+        wrong = [name for name in of_other if getattr(self, name) != fields[name].default]
+        for name in wrong:
+            meant = dict(zip(ROTARY_FIELDS + SLIDING_FIELDS, SLIDING_FIELDS + ROTARY_FIELDS, strict=True))[
+                name
+            ]
+            yield Fault(
+                "wrong_unit",
+                f"A {self.kind} hinge has no {name}.",
+                f"/{name}",
+                f"It moves in {self.unit}: give {meant}.",
+            )
+        if wrong:
+            return
+        if self.is_prismatic and self.max_m is None:
+            yield Fault(
+                "missing", "A prismatic hinge needs max_m.", "/max_m", "Give its largest extension, in m."
+            )
+        else:
+            yield from range_faults("hinge", self.low, self.high, self.held, self.unit)
 
 
-def range_faults(what: str, min_rad: float, max_rad: float, angle_rad: float) -> Iterator[Fault]:
-    """Check that the range of a drive has a width and holds the held angle."""
-    if min_rad >= max_rad:
+def range_faults(what: str, low: float, high: float, held: float, unit: Unit = "rad") -> Iterator[Fault]:
+    """Check that the range of a drive, rad or m, has a width and holds the held value."""
+    lowest, highest, field = ROTARY_FIELDS if unit == "rad" else SLIDING_FIELDS
+    if low >= high:
         yield Fault(
             "range_upside_down",
-            f"min_rad {min_rad:g} is not below max_rad {max_rad:g}.",
-            "/min_rad",
+            f"{lowest} {low:g} is not below {highest} {high:g}.",
+            f"/{lowest}",
             "Swap them, or correct one.",
         )
-    elif not min_rad <= angle_rad <= max_rad:
+    elif not low <= held <= high:
+        noun = "an angle" if unit == "rad" else "an extension"
         yield Fault(
             "angle_out_of_range",
-            f"The {what} is held at {angle_rad:g} rad, and goes from {min_rad:g} to {max_rad:g} rad.",
-            "/angle_rad",
-            "Give an angle inside the range, or widen min_rad and max_rad.",
+            f"The {what} is held at {held:g} {unit}, and goes from {low:g} to {high:g} {unit}.",
+            f"/{field}",
+            f"Give {noun} inside the range, or widen {lowest} and {highest}.",
         )
 
 
@@ -117,20 +217,24 @@ class OfSide(Protocol):
         """Right or left."""
 
 
-class Turned(Protocol):
-    """The angle data of a hinge, from a document or from the numerics."""
+class Moved(Protocol):
+    """The range of a hinge or control, from a document or from the numerics."""
 
     @property
-    def min_rad(self) -> float:
-        """Smallest angle."""
+    def low(self) -> float:
+        """Smallest value."""
 
     @property
-    def max_rad(self) -> float:
-        """Largest angle."""
+    def high(self) -> float:
+        """Largest value."""
 
     @property
-    def angle_rad(self) -> float:
+    def held(self) -> float:
         """Held if no history is given."""
+
+    @property
+    def unit(self) -> Unit:
+        """Of these."""
 
 
 class Hinged(OfSide, Protocol):
@@ -160,11 +264,13 @@ class Drive:
     hinges : tuple of (int, int)
         Number of the surface and of the hinge on it, each from 0; none of a control.
     low, high : float
-        Range that all its hinges allow, rad.
+        Range that all its hinges allow, in its unit.
     held : float
-        Angle of its hinges if no history is given, rad.
+        Angle or extension of its hinges if no history is given.
     controls : tuple of (int, int)
         Number of the surface and of the control on it, each from 0; none of a hinge.
+    unit : {"rad", "m"}
+        Of its history: m for prismatic hinges.
     """
 
     name: str
@@ -176,6 +282,7 @@ class Drive:
     high: float
     held: float
     controls: tuple[tuple[int, int], ...] = ()
+    unit: Unit = "rad"
 
     def fault(self, angle_rad: float, pointer: str, furthest_rad: float = 0.0) -> Fault | None:
         """Return the fault of an angle of the drive; None if it is in range.
@@ -187,7 +294,14 @@ class Drive:
         part = "control" if self.controls else "hinge"
         of = f"Its {part} on" if len(self.surfaces) == 1 else f"Its {part}s on"
         hint = f"{of} {' and '.join(map(repr, self.surfaces))} {'goes' if len(self.surfaces) == 1 else 'go'} "
-        hint += f"from {self.low:g} to {self.high:g} rad."
+        hint += f"from {self.low:g} to {self.high:g} {self.unit}."
+        if self.unit == "m":
+            return Fault(
+                "extension_out_of_range",
+                f"{self.name} is {angle_rad:g} m.",
+                pointer,
+                f"{hint} Correct the extension, or the hinge's min_m and max_m.",
+            )
         if max(abs(angle_rad), abs(furthest_rad)) > math.pi:
             hint += f" Is the angle in degrees? A column may say so in its name: {self.name}_deg."
         return Fault(
@@ -214,26 +328,26 @@ def without_side(name: str) -> str:
     return next((name.removesuffix(f"_{side}") for side in SIDES if name.endswith(f"_{side}")), name)
 
 
-def drives_of(hinges: Iterable[tuple[str, OfSide, tuple[int, int], Turned]]) -> dict[str, Drive]:
+def drives_of(hinges: Iterable[tuple[str, OfSide, tuple[int, int], Moved]]) -> dict[str, Drive]:
     """Return the drives of hinges, by name, in the order of the hinges.
 
     Parameters
     ----------
     hinges : iterable of tuple
-        For each, the name of its drive, its surface, the numbers of surface and hinge, and its angle data.
+        For each, the name of its drive, its surface, the numbers of surface and hinge, and its range.
     """
     found: dict[str, Drive] = {}
     for name, surface, at, hinge in hinges:
         word = name.removesuffix(f"_{surface.side}")
         former = found.get(
-            name, Drive(name, word, surface.side, (), (), -math.inf, math.inf, hinge.angle_rad)
+            name, Drive(name, word, surface.side, (), (), -math.inf, math.inf, hinge.held, unit=hinge.unit)
         )
         found[name] = replace(
             former,
             surfaces=(*former.surfaces, surface.name),
             hinges=(*former.hinges, at),
-            low=max(former.low, hinge.min_rad),
-            high=min(former.high, hinge.max_rad),
+            low=max(former.low, hinge.low),
+            high=min(former.high, hinge.high),
         )
     return found
 
@@ -263,8 +377,9 @@ def drive_faults(surfaces: Sequence[Hinged]) -> Iterator[Fault]:
                 )
             former, owner = first.setdefault(name, (hinge, surface.name))
             apart = math.dist(former.axis_B(surface.side), hinge.axis_B(surface.side))
-            if apart > SAME_AXIS or former.angle_rad != hinge.angle_rad:
-                what = "axis" if apart > SAME_AXIS else "angle_rad"
+            if former.kind != hinge.kind or apart > SAME_AXIS or former.held != hinge.held:
+                what = "angle_rad" if hinge.unit == "rad" else "extension_m"
+                what = "kind" if former.kind != hinge.kind else "axis" if apart > SAME_AXIS else what
                 yield Fault(
                     "unlike_hinges",
                     f"The drive {name!r} would turn hinges of {owner!r} and {surface.name!r} that differ in "
@@ -272,6 +387,21 @@ def drive_faults(surfaces: Sequence[Hinged]) -> Iterator[Fault]:
                     pointer,
                     "Give one of them another name: a drive turns all its hinges alike.",
                 )
+
+
+def field_name(name: str, unit: str) -> str:
+    """Return the field of a drive's history in documents: `fold_left_rad`, `span_left_m`."""
+    return f"{name}_{unit}"
+
+
+def wrong_unit(drive: Drive, unit: str, pointer: str) -> Fault:
+    """Return the fault of a history whose unit is not that of its drive."""
+    return Fault(
+        "wrong_unit",
+        f"{drive.name!r} {'slides' if drive.unit == 'm' else 'turns'}, and its history is in {unit}.",
+        pointer,
+        f"Give it in {drive.unit}, and name the column {field_name(drive.name, drive.unit)}.",
+    )
 
 
 def label(name: str) -> str:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from morphdata.base import Document
 from morphdata.faults import Fault
-from morphdata.schedules import Moment
+from morphdata.history import Moment
 from morphdata.search import MAX_SEED
 
 MAX_SPANWISE_ROWS = 50

@@ -15,7 +15,7 @@ from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.formats import FORMATS
 from morphdata.options import OUTPUT, VEHICLE, Option
 from morphdata.parameters import EXAMPLE_PARAMETERS, KnownModel, Parameters, flown_with
-from morphdata.vehicle import model_surfaces_faults, start_faults, trim_drive_faults
+from morphdata.vehicle import model_surfaces_faults, sliding_faults, start_faults, trim_drive_faults
 from morphdata.version import VERSION
 
 MAX_FITS = 1000
@@ -63,6 +63,7 @@ class ExportRequest(Request):
         """Check that the flight has the requested start, and that the model belongs to this aircraft."""
         yield from start_faults(self.flight, flown_with(self.model).start)
         yield from trim_drive_faults(self.aircraft, self.flight)
+        yield from sliding_faults(self.aircraft, self.flight, flown_with(self.model).lattice)
         yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
 
 

@@ -34,7 +34,13 @@ from morphdata.renamed import RENAMED, both_spellings, current_name
 from morphdata.samples import EXAMPLE_SAMPLE, InlineSample, Sample
 from morphdata.search import SwarmSearch, WarmStart
 from morphdata.uncertainty import UncertaintySettings
-from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults, trim_drive_faults
+from morphdata.vehicle import (
+    flexible_wing_faults,
+    model_surfaces_faults,
+    sliding_faults,
+    start_faults,
+    trim_drive_faults,
+)
 
 MAX_SAMPLES = 64
 MAX_TOTAL_ROWS = 200_000
@@ -300,6 +306,7 @@ class SamplesRequest(Request):
         """Check aircraft, flight and samples together."""
         yield from start_faults(self.flight, self.model.start)
         yield from trim_drive_faults(self.aircraft, self.flight)
+        yield from sliding_faults(self.aircraft, self.flight, self.model.lattice)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_identify")
         for pointer, links in self.model.links_at():
             yield from links_faults(self.aircraft, links, f"/model/links_per_wing{pointer}")

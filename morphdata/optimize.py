@@ -14,8 +14,9 @@ from morphdata.aircraft import EXAMPLE_AIRCRAFT, Aircraft
 from morphdata.base import Angle, Document, Result
 from morphdata.controls import unmotorised
 from morphdata.drive_keys import resolved, shown_names
-from morphdata.drives import Drive
+from morphdata.drives import Drive, Extension, Unit, wrong_unit
 from morphdata.execution import Request
+from morphdata.extensions import SLIDING_LIMITS, limits_of
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
 from morphdata.lattice import OWN_OR_CHOSEN, Lattice, StepS
@@ -27,6 +28,7 @@ from morphdata.vehicle import (
     flexible_wing_faults,
     model_surfaces_faults,
     moved_trim_faults,
+    sliding_faults,
     start_faults,
     trim_drive_faults,
 )
@@ -64,8 +66,15 @@ class Morph(Document):
     initial_rad: Annotated[Angle, Option("--initial", MORPH)] = Field(
         default=0.0, description="Angle of the drive before the morph, rad."
     )
-    final_rad: Annotated[Angle, Option("--final", MORPH)] = Field(
-        description="Angle of the drive at the end of the morph, rad."
+    final_rad: Annotated[Angle | None, Option("--final", MORPH)] = Field(
+        default=None, description="Angle of the drive at the end of the morph, rad."
+    )
+    initial_m: Annotated[Extension | None, Option("--initial-m", MORPH)] = Field(
+        default=None, description="Of a drive that slides: its extension before the morph, m; default 0."
+    )
+    final_m: Annotated[Extension | None, Option("--final-m", MORPH)] = Field(
+        default=None,
+        description="Of a drive that slides, instead of `final_rad`: its extension at the end, m.",
     )
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_MORPH_S), Option("--duration", MORPH)] = Field(
         description="Duration of the morph, s; for the goals `minimum_time` and `pareto` the longest that "
@@ -97,9 +106,24 @@ class Morph(Document):
     )
 
     @property
-    def change_rad(self) -> float:
-        """Signed change of the angle, rad."""
-        return self.final_rad - self.initial_rad
+    def unit(self) -> Unit:
+        """Of the drive's history: m if it slides."""
+        return "rad" if self.final_m is None else "m"
+
+    @property
+    def begin(self) -> float:
+        """Angle or extension before the morph."""
+        return self.initial_rad if self.final_m is None else self.initial_m or 0.0
+
+    @property
+    def end(self) -> float:
+        """Angle or extension at its end."""
+        return self.final_rad or 0.0 if self.final_m is None else self.final_m
+
+    @property
+    def change(self) -> float:
+        """Signed change of the angle or extension."""
+        return self.end - self.begin
 
     def named_drive(self, drives: Mapping[str, Drive]) -> str:
         """Return the drive to be moved, or its word: as given, else the only word of the aircraft."""
@@ -131,12 +155,24 @@ class Morph(Document):
 
     def faults(self) -> Iterator[Fault]:
         """Check that the angle changes, and that the fields needed by the goal are given."""
-        if abs(self.change_rad) < SMALLEST_CHANGE_RAD:
+        if self.final_rad is None and self.final_m is None:
+            yield Fault(
+                "missing",
+                "The end of the morph is not given.",
+                "/final_rad",
+                "Add final_rad, or final_m for a drive that slides.",
+            )
+            return
+        mixed = self.initial_m if self.unit == "rad" else self.final_rad or self.initial_rad or None
+        if mixed is not None:
+            wrong = "/initial_m" if self.unit == "rad" else "/final_rad" if self.final_rad else "/initial_rad"
+            yield Fault("given_twice", "The morph has angles and extensions.", wrong, "Leave this out.")
+        if abs(self.change) < SMALLEST_CHANGE_RAD:
             yield Fault(
                 "nothing_to_morph",
-                f"The morph begins and ends at {self.final_rad:g} rad.",
-                "/final_rad",
-                "Give another final_rad.",
+                f"The morph begins and ends at {self.end:g} {self.unit}.",
+                f"/final_{self.unit}",
+                f"Give another final_{self.unit}.",
             )
         if self.goal == "minimum_time" and self.max_variation_rad2 is None:
             yield Fault(
@@ -172,14 +208,42 @@ class Limits(Document):
         default=None,
         description="Largest torque of any hinge's motor, N m, in the model used in the search.",
     )
+    max_rate_m_s: Annotated[
+        Annotated[float, Field(gt=0.0, le=100.0)] | None, Option("--rate-limit-m", LIMITS)
+    ] = Field(default=None, description="Of a drive that slides: fastest rate, m/s.")
+    max_accel_m_s2: Annotated[
+        Annotated[float, Field(gt=0.0, le=1e5)] | None, Option("--accel-limit-m", LIMITS)
+    ] = Field(default=None, description="Of a drive that slides: largest acceleration, m/s^2.")
+    max_drive_force_n: Annotated[
+        Annotated[float, Field(gt=0.0, le=1e9)] | None, Option("--force-limit", LIMITS)
+    ] = Field(
+        default=None,
+        description="Of a drive that slides: largest force of any hinge's drive, N, in the model used in the "
+        "search.",
+    )
 
-    def shortest_morph_s(self, change_rad: float) -> float:
+    def in_unit(self, unit: Unit) -> Limits:
+        """Return the limits with those of a unit under the names of angles, as searches use them."""
+        if unit == "rad":
+            return self
+        values = {of_angle: getattr(self, name) for of_angle, name in SLIDING_LIMITS.items()}
+        return self.model_copy(update=values | dict.fromkeys(SLIDING_LIMITS.values()))
+
+    def unit_faults(self, unit: Unit) -> Iterator[Fault]:
+        """Check that no limit is in the unit of another kind of drive."""
+        pairs = [(name, other) if unit == "m" else (other, name) for name, other in SLIDING_LIMITS.items()]
+        for wrong, right in pairs:
+            if getattr(self, wrong) is not None:
+                hint = f"The morph is in {unit}: give {right}."
+                yield Fault("wrong_unit", f"{wrong} does not limit it.", f"/limits/{wrong}", hint)
+
+    def shortest_morph_s(self, change: float) -> float:
         """Compute the minimum time from rest to rest: full acceleration, full rate, full braking.
 
         Parameters
         ----------
-        change_rad : float
-            Absolute change of the angle, rad.
+        change : float
+            Absolute change of the angle, rad, or of the extension, m, of limits `in_unit`.
 
         Returns
         -------
@@ -188,9 +252,9 @@ class Limits(Document):
         """
         rate = math.inf if self.max_rate_rad_s is None else self.max_rate_rad_s
         accel = math.inf if self.max_accel_rad_s2 is None else self.max_accel_rad_s2
-        if rate * rate / accel < change_rad:
-            return change_rad / rate + rate / accel
-        return 2.0 * math.sqrt(change_rad / accel)
+        if rate * rate / accel < change:
+            return change / rate + rate / accel
+        return 2.0 * math.sqrt(change / accel)
 
 
 class Weights(Document):
@@ -207,13 +271,15 @@ class Weights(Document):
 
 
 def goal_faults(morph: Morph, limits: Limits) -> Iterator[Fault]:
-    """Check that a shortest duration exists for a goal that searches for one."""
+    """Check that limits are in the morph's unit, and a shortest duration exists where one is searched."""
+    yield from limits.unit_faults(morph.unit)
+    limits = limits.in_unit(morph.unit)
     if morph.goal != "variation" and limits.max_rate_rad_s is None and limits.max_accel_rad_s2 is None:
         yield Fault(
             "missing",
             f"Without a limit the goal {morph.goal!r} has no shortest duration.",
             "/limits",
-            "Give max_rate_rad_s or max_accel_rad_s2.",
+            f"Give {limits_of(morph.unit)}.",
         )
 
 
@@ -300,6 +366,7 @@ class OptimizeRequest(Request):
         """Check aircraft, model and morph together, and the size of the search."""
         yield from start_faults(self.flight, flown_with(self.model).start)
         yield from trim_drive_faults(self.aircraft, self.flight)
+        yield from sliding_faults(self.aircraft, self.flight, flown_with(self.model).lattice)
         yield from flexible_wing_faults(self.aircraft, "nothing_to_bend")
         yield from model_surfaces_faults(self.aircraft, self.model.known, "/model/parameters")
         yield from self._hinge_faults()
@@ -325,8 +392,13 @@ class OptimizeRequest(Request):
             yield from error.faults
             return
         yield from moved_trim_faults(self.aircraft, self.flight, flown_with(self.model).start, moved)
-        for name in ("initial_rad", "final_rad"):
-            angle, at = getattr(self.morph, name), f"/morph/{name}"
+        unit = self.morph.unit
+        turning = [each for each in moved if drives[each].unit != unit]
+        if turning:
+            yield wrong_unit(drives[turning[0]], unit, f"/morph/final_{unit}")
+            return
+        for name, angle in (("initial", self.morph.begin), ("final", self.morph.end)):
+            at = f"/morph/{name}_{unit}"
             yield from islice(filter(None, (drives[each].fault(angle, at) for each in moved)), 1)
         if self.limits.max_hinge_torque_nm is not None and (controls := unmotorised(drives, moved)):
             yield Fault(
@@ -338,13 +410,13 @@ class OptimizeRequest(Request):
 
     def _time_faults(self) -> Iterator[Fault]:
         morph, limits = self.morph, self.limits
-        min_s = limits.shortest_morph_s(abs(morph.change_rad))
+        min_s = limits.in_unit(morph.unit).shortest_morph_s(abs(morph.change))
         if morph.duration_s <= min_s:
             yield Fault(
                 "morph_too_short",
                 f"Within the limits the motion takes more than {morph.duration_s:g} s.",
                 "/morph/duration_s",
-                f"Give more than {min_s:.4g} s, or raise max_rate_rad_s or max_accel_rad_s2 in limits.",
+                f"Give more than {min_s:.4g} s, or raise {limits_of(morph.unit)} in limits.",
             )
         yield from goal_faults(morph, limits)
 
@@ -371,14 +443,21 @@ class FoundSchedule(Result):
         default=None,
         description="Angles at the knots; results of earlier versions have `knot_sweep_rad` only.",
     )
-    knot_sweep_rad: list[float] = Field(description="The same as `knot_angle_rad`, under its former name.")
+    knot_sweep_rad: list[float] | None = Field(
+        default=None, description="The same as `knot_angle_rad`, under its former name."
+    )
+    knot_extension_m: list[float] | None = Field(
+        default=None, description="Extensions at the knots of a drive that slides, instead of the angles."
+    )
 
 
 class KeptLimits(Result):
     """The allowed maximum rate and acceleration."""
 
-    max_rate_rad_s: float | None
-    max_accel_rad_s2: float | None
+    max_rate_rad_s: float | None = None
+    max_accel_rad_s2: float | None = None
+    max_rate_m_s: float | None = None
+    max_accel_m_s2: float | None = None
 
 
 class Variation(Result):

@@ -162,6 +162,8 @@ def _unknown_hint(location: Sequence[str | int], model: type[BaseModel]) -> str:
     *path, last = location
     name = str(last)[:SHOWN_CHARACTERS]
     here, within = _names(_models_at(path, model)), _names(_models_within(model))
+    if name in here:
+        return "It does not go with the other fields: leave it or them out."
     if near := difflib.get_close_matches(name, here, n=1):
         return f"Did you mean {near[0]!r}? Otherwise leave it out."
     if name in within:

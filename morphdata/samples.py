@@ -23,7 +23,7 @@ from morphdata.axes import ATTITUDE_FIELDS, Axes, QuaternionSeries, in_axes_of_h
 from morphdata.base import AngleSeries, ChannelSeries, Document, Identifier, SampleName, TimeSeries
 from morphdata.channels import channel_field, document_name, is_channel
 from morphdata.drive_keys import resolved, resolved_columns, shown_names, unmeasured_sides
-from morphdata.drives import RESERVED, SWEEPS, Drive
+from morphdata.drives import RESERVED, SWEEPS, Drive, field_name, wrong_unit
 from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.samplefiles.channel_columns import with_gaps
 from morphdata.samplefiles.declared import NOTHING, Declared
@@ -50,7 +50,7 @@ EXAMPLE_SAMPLE: dict[str, Any] = {
 EXAMPLE_FOLD: dict[str, Any] = {
     name: values for name, values in EXAMPLE_SAMPLE.items() if not name.startswith("sweep")
 } | {"name": "fold_30", "sweep_rad": [0.0, 0.0, 0.001, 0.003], "fold_left_deg": [0.0, 0.0, 0.1, 0.3]}
-UNITS = {"_rad": 1.0, "_deg": DEGREE}  # of the columns of drives inline
+UNITS = {"_rad": 1.0, "_deg": DEGREE, "_m": 1.0}  # of the columns of drives inline
 MISSPELT = 0.9  # so near to one of them no column is that of a drive
 
 
@@ -67,15 +67,21 @@ def _column(name: str) -> str:
 
 def drive_key(field: str) -> str | None:
     """Return the drive, or the word of both sides, of a column inline; None of all other columns."""
-    key, unit = field[:-4], field[-4:]
-    return key if unit in UNITS and channel_field(field) is None else None
+    suffix = _suffix(field)
+    return field.removesuffix(suffix) if suffix and channel_field(field) is None else None
+
+
+def _suffix(field: str) -> str:
+    """Return the unit at the end of a field of a drive, with its mark; "" for another field."""
+    return next((unit for unit in UNITS if field.endswith(unit)), "")
 
 
 class TrajectoryColumns(Document):
     """Columns of one flight, equally long; time rises, steps may be uneven.
 
     Every drive of the aircraft may have its column, `fold_left_rad`, or both sides of a kind one,
-    `fold_rad`; with `_deg` for `_rad` in degrees. Measured channels have theirs, named like those of
+    `fold_rad`; with `_deg` for `_rad` in degrees. Drives that slide have theirs in metres, `span_left_m`.
+    Measured channels have theirs, named like those of
     simulated flights, the unit at the end: `p_rad_s`, `nz`, `tip_right_z_m`. Null is a missing value.
     """
 
@@ -135,8 +141,13 @@ class TrajectoryColumns(Document):
         return {key: field for field in given if (key := drive_key(field)) is not None}
 
     @property
+    def drive_units(self) -> dict[str, str]:
+        """Unit, rad or m, of each column of a drive, by the drive's name or the word of both sides."""
+        return {key: "m" if _suffix(field) == "_m" else "rad" for key, field in self.drive_fields.items()}
+
+    @property
     def drives(self) -> dict[str, list[float]]:
-        """Angles of each column of a drive, rad, by the drive's name or the word of both sides."""
+        """Angles of each column of a drive, rad (or m), by the drive's name or the word of both sides."""
         return {key: self._angles(field) for key, field in self.drive_fields.items()}
 
     @property
@@ -157,7 +168,7 @@ class TrajectoryColumns(Document):
 
     def _angles(self, field: str) -> list[float]:
         angles: list[float] = getattr(self, field)
-        factor = UNITS[field[-4:]]
+        factor = UNITS[_suffix(field)]
         return angles if factor == 1.0 else [factor * angle for angle in angles]
 
     def faults(self) -> Iterator[Fault]:
@@ -227,8 +238,13 @@ class TrajectoryColumns(Document):
             yield no_drive(drives)
         angles = {key: self._angles(field) for key, field in fields.items() if key in followed.values()}
         reported = set()
+        units = self.drive_units
         for name, key in followed.items():
-            fault = _range_fault(drives[name], angles[key], f"/{fields[key]}")
+            fault = (
+                wrong_unit(drives[name], units[key], f"/{fields[key]}")
+                if units[key] != drives[name].unit
+                else _range_fault(drives[name], angles[key], f"/{fields[key]}")
+            )
             if fault is not None and key not in reported:
                 reported.add(key)
                 yield fault
@@ -240,11 +256,12 @@ def _given_twice(field: str, other: str) -> Fault:
 
 def no_drive(drives: Mapping[str, Drive]) -> Fault:
     """Return the fault of a sample without any angle of a drive."""
+    name, drive = next(iter(drives.items()))
     return Fault(
         "no_drive",
         "No column says how the aircraft's drives moved.",
         "",
-        f"Add {next(iter(drives))}_rad; its drives are {shown_names(drives)}.",
+        f"Add {field_name(name, drive.unit)}; its drives are {shown_names(drives)}.",
     )
 
 
@@ -355,7 +372,7 @@ def load_sample(
     """
     path = Path(path)
     columns = read_flight(path, declared)
-    names = list(columns.drives)
+    names, units = list(columns.drives), dict(columns.units)
     if drives is not None:
         unreadable = {name: said_of(fault) for name, fault in columns.unreadable.items()}
         try:
@@ -365,6 +382,7 @@ def load_sample(
                 for fault in unmeasured_sides(followed, drives)
             )
             names = list(dict.fromkeys(followed.values()))
+            units = {key: drives[name].unit for name, key in followed.items()} | units
         except InvalidInput as error:
             raise InvalidInput(f"{path}: {error.message}", hint=error.hint) from None
     angles = {name: columns.drives[name] for name in names}
@@ -373,7 +391,10 @@ def load_sample(
         {
             "name": sample_name(path.stem),
             "role": role,
-            **{INLINE.get(name, f"{name}_rad"): list(values) for name, values in named.items()},
+            **{
+                INLINE.get(name, field_name(name, units.get(name, "rad"))): list(values)
+                for name, values in named.items()
+            },
             **{document_name(name): with_gaps(values) for name, values in columns.channels.items()},
         }
     )

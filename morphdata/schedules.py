@@ -2,27 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import islice, pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, FailFast, Field, PrivateAttr, model_validator
+from pydantic import (
+    ConfigDict,
+    Discriminator,
+    FailFast,
+    Field,
+    PrivateAttr,
+    Tag,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from morphdata.base import Angle, Document
 from morphdata.drive_keys import resolved
-from morphdata.drives import SWEEPS, Drive
+from morphdata.drives import SWEEPS, Drive, Unit, field_name
+from morphdata.extensions import (
+    EXTENSION_FIELDS,
+    ExtensionSchedule,
+)
 from morphdata.faults import Fault, InvalidInput, refuse
+from morphdata.history import (
+    DEFAULT_RAMP_S,
+    MAX_KNOTS,
+    ClockTime,
+    Duration,
+    Moment,
+    Rate,
+    history_faults,
+    rate_faults,
+)
 from morphdata.refusals import FAULTS, HALF_TURN_RAD, escaped
 from morphdata.samplefiles.fault import said_of
-from morphdata.samplefiles.flight import LONGEST_FLIGHT_S, MAX_ROWS, MIN_ROWS
+from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS
 from morphdata.samplefiles.reading import place_in, read_file
 from morphdata.samples import columns_of_aircraft
 
-MAX_DURATION_S = LONGEST_FLIGHT_S
-MAX_KNOTS = 1000
-DEFAULT_RAMP_S = 0.1
 SCHEDULE_COLUMNS = ("t", *SWEEPS)
 
 EXAMPLE_SCHEDULE: dict[str, Any] = {
@@ -33,17 +52,22 @@ EXAMPLE_SCHEDULE: dict[str, Any] = {
     "start_s": 0.2,
 }
 
-Moment = Annotated[float, Field(ge=0.0, le=MAX_DURATION_S)]
-Duration = Annotated[float, Field(gt=0.0, le=MAX_DURATION_S)]
-ClockTime = Annotated[float, Field(ge=-MAX_DURATION_S, le=1e6)]
-Rate = Annotated[float, Field(gt=0.0, le=100.0)]
-
 
 class Hold(Document):
     """A hinge that does not move."""
 
     kind: Literal["hold"]
     angle_rad: Angle = 0.0
+
+    @property
+    def unit(self) -> Unit:
+        """Of its history."""
+        return "rad"
+
+    @property
+    def named(self) -> Iterator[tuple[float, str]]:
+        """Angles that it names, with their pointers."""
+        yield self.angle_rad, "angle_rad"
 
 
 class ConstantRate(Document):
@@ -70,37 +94,20 @@ class ConstantRate(Document):
             return self.duration_s
         return abs(self.final_rad - self.initial_rad) / (self.rate_rad_s or 1.0)
 
+    @property
+    def unit(self) -> Unit:
+        """Of its history."""
+        return "rad"
+
+    @property
+    def named(self) -> Iterator[tuple[float, str]]:
+        """Angles that it names, with their pointers."""
+        yield self.initial_rad, "initial_rad"
+        yield self.final_rad, "final_rad"
+
     def faults(self) -> Iterator[Fault]:
         """Check that duration or rate is given, and that the ramps fit into the morph."""
-        if (self.duration_s is None) == (self.rate_rad_s is None):
-            both = self.duration_s is not None
-            yield Fault(
-                "given_twice" if both else "missing",
-                f"duration_s and rate_rad_s are {'both given' if both else 'both missing'}.",
-                "/rate_rad_s" if both else "/duration_s",
-                "Give one of them: the other follows.",
-            )
-        elif self.morph_s == 0.0:
-            yield Fault(
-                "nothing_to_morph",
-                "rate_rad_s needs two different angles.",
-                "/final_rad",
-                'Give another final_rad, or {"kind": "hold"}.',
-            )
-        elif self.morph_s > MAX_DURATION_S:
-            yield Fault(
-                "morph_too_long",
-                f"At {self.rate_rad_s:g} rad/s the morph takes {self.morph_s:g} s.",
-                "/rate_rad_s",
-                f"It must take at most {MAX_DURATION_S:g} s: morph faster.",
-            )
-        elif self.ramp_s > self.morph_s / 2:
-            yield Fault(
-                "ramp_too_long",
-                f"Two ramps of {self.ramp_s:g} s do not fit into a morph of {self.morph_s:g} s.",
-                "/ramp_s",
-                f"Give at most {self.morph_s / 2:g} s, or morph more slowly.",
-            )
+        yield from rate_faults(self.duration_s, self.rate_rad_s, self.morph_s, self.ramp_s, self.unit)
 
 
 class Quadratic(Document):
@@ -112,6 +119,17 @@ class Quadratic(Document):
     duration_s: Duration
     start_s: Moment = 0.0
 
+    @property
+    def unit(self) -> Unit:
+        """Of its history."""
+        return "rad"
+
+    @property
+    def named(self) -> Iterator[tuple[float, str]]:
+        """Angles that it names, with their pointers."""
+        yield self.initial_rad, "initial_rad"
+        yield self.final_rad, "final_rad"
+
 
 class Spline(Document):
     """Clamped cubic spline through knots: at rest before the first and after the last."""
@@ -120,9 +138,19 @@ class Spline(Document):
     knot_time_s: Annotated[list[ClockTime], FailFast(), Field(min_length=2, max_length=MAX_KNOTS)]
     knot_angle_rad: Annotated[list[Angle], FailFast(), Field(min_length=2, max_length=MAX_KNOTS)]
 
+    @property
+    def unit(self) -> Unit:
+        """Of its history."""
+        return "rad"
+
+    @property
+    def named(self) -> Iterator[tuple[float, str]]:
+        """Angles that it names, with their pointers."""
+        yield from ((angle, f"knot_angle_rad/{row}") for row, angle in enumerate(self.knot_angle_rad))
+
     def faults(self) -> Iterator[Fault]:
         """Check that there is an angle for every time, and that time increases."""
-        yield from _history_faults(self, "knot_time_s", "knot_angle_rad")
+        yield from history_faults(self, "knot_time_s", "knot_angle_rad", "angle")
 
 
 class Tabulated(Document):
@@ -132,34 +160,35 @@ class Tabulated(Document):
     time_s: Annotated[list[ClockTime], FailFast(), Field(min_length=3, max_length=MAX_ROWS)]
     angle_rad: Annotated[list[Angle], FailFast(), Field(min_length=3, max_length=MAX_ROWS)]
 
+    @property
+    def unit(self) -> Unit:
+        """Of its history."""
+        return "rad"
+
+    @property
+    def named(self) -> Iterator[tuple[float, str]]:
+        """Angles that it names, with their pointers."""
+        yield from ((angle, f"angle_rad/{row}") for row, angle in enumerate(self.angle_rad))
+
     def faults(self) -> Iterator[Fault]:
         """Check that there is an angle for every time, and that time increases."""
-        yield from _history_faults(self, "time_s", "angle_rad")
+        yield from history_faults(self, "time_s", "angle_rad", "angle")
 
 
-def _history_faults(schedule: Document, time: str, angle: str) -> Iterator[Fault]:
-    times: Sequence[float] = getattr(schedule, time)
-    angles: Sequence[float] = getattr(schedule, angle)
-    if len(times) != len(angles):
-        yield Fault(
-            "unequal_lengths",
-            f"There are {len(times)} times and {len(angles)} angles.",
-            f"/{angle}",
-            "Give one angle for every time.",
-        )
-    for row, (before, after) in enumerate(pairwise(times), start=1):
-        if after <= before:
-            yield Fault(
-                "time_not_rising",
-                f"Time goes from {before:g} s to {after:g} s at row {row}.",
-                f"/{time}/{row}",
-                "Sort the rows by time and drop repeated ones.",
-            )
-            break
+def _unit(value: Any) -> str:
+    """Return the unit of a schedule, by the names of its fields."""
+    if isinstance(value, dict):
+        return "m" if any(name in value for name in EXTENSION_FIELDS) else "rad"
+    return str(getattr(value, "unit", "rad"))
 
 
-AnySchedule = Hold | ConstantRate | Quadratic | Spline | Tabulated
-Schedule = Annotated[AnySchedule, Field(discriminator="kind")]
+AngleSchedule = Hold | ConstantRate | Quadratic | Spline | Tabulated
+AnySchedule = AngleSchedule | ExtensionSchedule
+Schedule = Annotated[
+    Annotated[AngleSchedule, Field(discriminator="kind"), Tag("rad")]
+    | Annotated[ExtensionSchedule, Field(discriminator="kind"), Tag("m")],
+    Discriminator(_unit),
+]
 
 
 EXAMPLE_HOLD: dict[str, Any] = {"kind": "hold", "angle_rad": 0.2}
@@ -254,12 +283,29 @@ class Schedules(Document):
         given = self.given
         reported = set()
         for name, key in keys.items():
-            at = f"/schedules/{escaped(key)}"
-            faults = (drives[name].fault(angle, f"{at}/{place}") for angle, place in _angles(given[key]))
+            at, drive = f"/schedules/{escaped(key)}", drives[name]
+            if given[key].unit != drive.unit:
+                yield unit_fault(name, drive.unit, given[key], at)
+                break
+            faults = (drive.fault(value, f"{at}/{place}") for value, place in given[key].named)
             for fault in islice(filter(None, faults), 1):
                 if key not in reported:
                     reported.add(key)
                     yield fault
+
+
+def unit_fault(name: str, unit: Unit, schedule: AnySchedule, pointer: str) -> Fault:
+    """Return the fault of a schedule in another unit than that of its drive."""
+    _, place = next(schedule.named)
+    field = place.partition("/")[0]
+    words = {"rad": "angle", "m": "extension"}
+    stem = field.removesuffix(f"_{schedule.unit}").replace(words[schedule.unit], words[unit])
+    return Fault(
+        "wrong_unit",
+        f"The drive {name!r} {'slides' if unit == 'm' else 'turns'}, and {field} is in {schedule.unit}.",
+        f"{pointer}/{place}",
+        f"Give its history in {unit}: {stem}_{unit}; in a file, name the column {field_name(name, unit)}.",
+    )
 
 
 class TabulatedSchedules(Schedules):
@@ -303,24 +349,12 @@ class TabulatedSchedules(Schedules):
             raise InvalidInput(message, pointer="/schedules", hint=error.hint) from None
 
 
-def _angles(schedule: AnySchedule) -> Iterator[tuple[float, str]]:
-    """Angles named in a schedule, with their pointers."""
-    if isinstance(schedule, Hold):
-        yield schedule.angle_rad, "angle_rad"
-    elif isinstance(schedule, ConstantRate | Quadratic):
-        yield schedule.initial_rad, "initial_rad"
-        yield schedule.final_rad, "final_rad"
-    elif isinstance(schedule, Spline):
-        yield from ((angle, f"knot_angle_rad/{row}") for row, angle in enumerate(schedule.knot_angle_rad))
-    else:
-        yield from ((angle, f"angle_rad/{row}") for row, angle in enumerate(schedule.angle_rad))
-
-
 def load_schedules(path: str | Path) -> Schedules:
     """Read schedules from a file with the column t and a column for each drive that moves.
 
     A column is named after a drive, or after the word of a kind of hinge to move both sides together. Units
-    in the names are accepted (``t_ms``, ``fold_left_deg``); columns that are not drives of the aircraft are
+    in the names are accepted (``t_ms``, ``fold_left_deg``), and those of drives that slide are needed
+    (``span_m``); columns that are not drives of the aircraft are
     ignored, so that a sample flight is also a schedule. A drive without a column holds its angle.
 
     Raises
@@ -341,9 +375,11 @@ def load_schedules(path: str | Path) -> Schedules:
                 hint="sort the rows by time and drop repeated ones",
             )
     unreadable = {name: said_of(fault) for name, fault in table.unreadable.items()}
-    histories = {}
+    histories: dict[str, dict[str, Any]] = {}
     for name, angles in table.drives.items():
-        if max(map(abs, angles)) > HALF_TURN_RAD:
+        if table.units.get(name) == "m":
+            histories[name] = {"kind": "tabulated", "time_s": times, "extension_m": list(angles)}
+        elif max(map(abs, angles)) > HALF_TURN_RAD:
             row = next(row for row, angle in enumerate(angles) if abs(angle) > HALF_TURN_RAD)
             unreadable[name] = (
                 f"{place_in(path, table, row)}: {name} is {angles[row]:g} rad; if the column is in degrees, "

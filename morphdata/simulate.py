@@ -15,13 +15,21 @@ from morphdata.environment import Environment
 from morphdata.execution import Request
 from morphdata.faults import Fault
 from morphdata.flight import EXAMPLE_FLIGHT, Flight
+from morphdata.history import MAX_DURATION_S, Duration
 from morphdata.lattice import CHOSEN, FlightStepS, Lattice, Start
 from morphdata.options import MODEL, SCHEDULE, VEHICLE, Option
 from morphdata.parameters import KnownModel, flown_with
 from morphdata.samplefiles.flight import MAX_ROWS, MIN_ROWS
-from morphdata.schedules import EXAMPLE_SCHEDULE, MAX_DURATION_S, Duration, Schedules
+from morphdata.schedules import EXAMPLE_SCHEDULE, Schedules
 from morphdata.shape import FlownShape, SurfaceSections
-from morphdata.vehicle import flexible_wing_faults, model_surfaces_faults, start_faults, trim_drive_faults
+from morphdata.telescopes import telescoping, unsupported_faults
+from morphdata.vehicle import (
+    flexible_wing_faults,
+    model_surfaces_faults,
+    sliding_faults,
+    start_faults,
+    trim_drive_faults,
+)
 from morphdata.warnings import Warnings
 
 DEFAULT_ELEMENTS = 10
@@ -114,6 +122,7 @@ class SimulateRequest(Request, OutputChoice):
         """Check that the flight can start, its drives stay in range, and its length is permitted."""
         yield from start_faults(self.flight, flown_with(self.model).start)
         yield from trim_drive_faults(self.aircraft, self.flight)
+        yield from sliding_faults(self.aircraft, self.flight, flown_with(self.model).lattice)
         yield from self.schedules.drive_faults(self.aircraft.drives)
         if not MIN_ROWS <= self.rows <= MAX_ROWS:
             yield Fault(
@@ -129,6 +138,12 @@ class SimulateRequest(Request, OutputChoice):
                 "/duration_s",
                 f"At most {MAX_STEPS[self.model.kind]}: reduce duration_s, or choose a longer model.step_s.",
             )
+        yield from unsupported_faults(
+            telescoping(self.aircraft.surfaces),
+            moving_air=self.environment is not None and not self.environment.still,
+            channels=self.channels or [],
+            flexible=self.model.kind == "flexible",
+        )
         surfaces = [surface.name for surface in self.aircraft.surfaces]
         end_s = (self.rows - 1) * self.output_step_s
         yield from self.output_faults(surfaces, self.flight.gravity_m_s2, (0.0, end_s))

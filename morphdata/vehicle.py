@@ -9,9 +9,11 @@ from morphdata.controls import control_names
 from morphdata.drives import without_side
 from morphdata.faults import Fault
 from morphdata.flight import Flight
+from morphdata.lattice import Lattice
 from morphdata.links import by_pair
 from morphdata.pairs import mirror_pairs
 from morphdata.parameters import Parameters
+from morphdata.telescopes import telescoping, unsupported_faults
 from morphdata.trim_drives import PITCH, ROLL, YAW, ControlPart, balancing, meant
 
 
@@ -44,6 +46,14 @@ def trim_drive_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
                 f"/flight/{field}",
                 f"Its drives are {', '.join(drives)}." if drives else f"It has no drives: omit {field}.",
             )
+        for each in names:
+            if drives[each].unit != "rad":
+                yield Fault(
+                    "no_such_drive",
+                    f"The drive {each!r} slides, and a trim turns its drive.",
+                    f"/flight/{field}",
+                    f"Trim with a drive that turns, or omit {field}.",
+                )
         for former in {taken[each]: None for each in names if each in taken}:
             yield Fault(
                 "drive_named_twice",
@@ -52,6 +62,13 @@ def trim_drive_faults(aircraft: Aircraft, flight: Flight) -> Iterator[Fault]:
                 f"It is the flight's {former} already: name another drive, or omit {field}.",
             )
         taken |= dict.fromkeys(names, field)
+
+
+def sliding_faults(aircraft: Aircraft, flight: Flight, lattice: Lattice) -> Iterator[Fault]:
+    """Check that nothing is asked of telescoping surfaces that is not computed."""
+    yield from unsupported_faults(
+        telescoping(aircraft.surfaces), apparent_mass=flight.apparent_mass, lattice_shape=lattice.shape
+    )
 
 
 def trim_drives(aircraft: Aircraft, flight: Flight) -> dict[str, str]:

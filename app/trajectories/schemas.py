@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from morphdata.base import SampleName
 from morphdata.channels import document_name
-from morphdata.drives import SWEEPS
+from morphdata.drives import SWEEPS, field_name
 from morphdata.faults import Fault
 from morphdata.samplefiles.columns import MAX_DRIVES
 from morphdata.samplefiles.flight import INLINE
@@ -55,7 +55,7 @@ class TrajectoryUpload(TrajectoryColumns):
         fields = self.model_dump(exclude={"name", "unreadable"}, exclude_none=True)
         for key, field in self.drive_fields.items():
             del fields[field]
-            fields[f"{key}_rad"] = self.drives[key]
+            fields[field_name(key, self.drive_units[key])] = self.drives[key]
         for column, field in self.channel_fields.items():
             del fields[field]
             fields[document_name(column)] = self.channels[column]

@@ -18,6 +18,7 @@ from app.parsing.pool import refusal
 from app.trajectories.repository import insert_trajectory
 from app.trajectories.schemas import TrajectorySummary, TrajectoryUpload
 from morphdata.channels import document_name
+from morphdata.drives import field_name
 from morphdata.faults import Fault, InvalidInput
 from morphdata.samplefiles.channel_columns import with_gaps
 from morphdata.samplefiles.columns import MAX_DRIVES, FlightColumns
@@ -75,7 +76,9 @@ def upload_of(flight: FlightColumns, filename: str, name: str | None) -> Traject
     ]
     if faults:
         raise InvalidRequest.of(faults)
-    named: dict[str, Any] = {_field(key): values for key, values in columns.items()}
+    named: dict[str, Any] = {
+        _field(key, flight.units.get(key, "rad")): values for key, values in columns.items()
+    }
     named |= {document_name(key): with_gaps(values) for key, values in flight.channels.items()}
     unreadable = list(flight.unreadable.items())[:MAX_DRIVES]
     try:
@@ -90,8 +93,8 @@ def upload_of(flight: FlightColumns, filename: str, name: str | None) -> Traject
         ) from None
 
 
-def _field(key: str) -> str:
-    return INLINE.get(key, f"{key}_rad")
+def _field(key: str, unit: str = "rad") -> str:
+    return INLINE.get(key, field_name(key, unit))
 
 
 def _place(fault: FileFault) -> str:

@@ -32,6 +32,20 @@ NO_GUST: Array = np.zeros(0)
 LEVEL: Array = np.eye(3)
 
 
+# the parts of a lattice that change as it slides along its surfaces
+SEATED = (
+    "line_core",
+    "line_width4",
+    "line_chord2",
+    "corner_arm",
+    "control_arm",
+    "drag_arm",
+    "drag_area",
+    "moment_area",
+    "slope",
+)
+
+
 @dataclass(frozen=True)
 class Riders:
     """Which parts of a lattice ride on which section (k sections, c ring corners, r panels, t strips).
@@ -81,6 +95,7 @@ class MovingLattice:
         self.parts = lattice_parts(table, riders, core, density, mach)
         self.at = lattice_place(self.parts, riders.sections, table.corners)
         self.at.slope[:] = riders.slope
+        self._density, self._mach = density, mach
         self._rings = table.rings
         self._factors: Any = None  # of `lu_factor`, computed on first use in this place
 
@@ -89,6 +104,12 @@ class MovingLattice:
         self.at.R_BS[:], self.at.x_B[:] = R_BS, x_B
         place_lattice(self.parts, self.at, stream_B)
         self._factors = None
+
+    def reseat(self, table: RingTable, riders: Riders, core: VortexCore) -> None:
+        """Take the sizes and arms of a lattice of the same panels, which has slid along its surfaces."""
+        seated = lattice_parts(table, riders, core, self._density, self._mach)
+        for name in SEATED:
+            getattr(self.parts, name)[:] = getattr(seated, name)
 
     def deflect(self, deflection: Array) -> None:
         """Set the deflections (c,) of all control surfaces, trailing edge down, rad."""

@@ -27,7 +27,7 @@ x l at the trailing edge. Hence normal force and moments from ``g = G_te dy``, `
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from morphcore.aero.bent_shape import BentShape
 from morphcore.aero.kernels.loads import (
+    AREA_CHORD,
     CENTRE_X,
     CHORD_SLOPE,
     CHORD_X,
@@ -43,15 +44,17 @@ from morphcore.aero.kernels.loads import (
     EDGE_DY,
     EDGE_X,
     EDGE_Y,
+    INBOARD,
     MORE_OUTPUTS,
     OUTPUTS,
+    SLIDING_COLUMNS,
     STRIP_COLUMNS,
     VORTEX_X,
 )
 from morphcore.aero.vlm import RingTable, influence, ring_table
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.geometry.control_slopes import ControlSlopes, control_slopes
-from morphcore.geometry.lattice import SurfaceLattice, surface_lattice, surface_pose
+from morphcore.geometry.lattice import SurfaceLattice, strip_areas, surface_lattice, surface_pose
 from morphcore.geometry.mirror import mirror_groups
 from morphcore.geometry.surface import Surface
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
@@ -121,7 +124,10 @@ class AircraftLattice:
     def has_more_outputs(self) -> bool:
         """Whether strips need `MORE_OUTPUTS`: unless all surfaces are unbent oblongs in a plane, wake too."""
         surfaces = self.aircraft.surfaces
-        turns = any(hinge.axis_B[0] or hinge.axis_B[1] for hinge in self.aircraft.hinges)
+        turns = any(
+            hinge.axis_B[2] if hinge.prismatic else hinge.axis_B[0] or hinge.axis_B[1]
+            for hinge in self.aircraft.hinges
+        )
         heights = {surface.position_m[2] for surface in surfaces}
         oblong = all(s.is_upright and s.root_chord_m == s.tip_chord_m for s in surfaces)
         bent = self.settings.shape == "trimmed"
@@ -140,6 +146,21 @@ class AircraftLattice:
         """First of the further rows of a strip; -1 if there are none."""
         return OUTPUTS * self.strips + MORE_OUTPUTS * strip if self.has_more_outputs else -1
 
+    def at(self, angles: Array) -> AircraftLattice:
+        """The lattice at angles (h,) of all hinges: panels that telescope have one on their visible part."""
+        surfaces = self.aircraft.surfaces
+        if all(surface.mouth_m is None for surface in surfaces):
+            return self
+        hidden = [
+            s.hidden_m(angles[own]) for s, own in zip(surfaces, self.aircraft.hinge_columns, strict=True)
+        ]
+        panels = (self.settings.chordwise, self.settings.spanwise)
+        seen, reflected = (
+            tuple(surface_lattice(each, *panels, inside) for each, inside in zip(of, hidden, strict=False))
+            for of in (surfaces, self.images)
+        )
+        return replace(self, lattices=seen, table=ring_table(seen + reflected))
+
     @property
     def operator_shape(self) -> tuple[int, int]:
         """Rows and columns of the operator, padded to whole tiles."""
@@ -154,9 +175,9 @@ class AircraftLattice:
 class LatticeOperator:
     """One reduced operator.
 
-    matrix : (rows, columns) as ``operator_shape``. strips : (strips, STRIP_COLUMNS), columns as listed in
-    aero/kernels/loads.py. controls : (rows, m) columns of the parts of the controls, `ControlSlopes`, for
-    unit deflection; see `AircraftLattice.control_columns`.
+    matrix : (rows, columns) as ``operator_shape``. strips : (strips, STRIP_COLUMNS) or, where a surface
+    telescopes, SLIDING_COLUMNS more, as listed in aero/kernels/loads.py. controls : (rows, m) columns of the
+    parts of the controls, `ControlSlopes`, for unit deflection; see `AircraftLattice.control_columns`.
     """
 
     matrix: Array
@@ -205,6 +226,7 @@ def lattice_operator(
     aircraft, angles = lattice.aircraft, np.asarray(hinge_rad, dtype=np.float64)
     if angles.shape != (len(aircraft.hinges),):
         raise ValueError(f"{angles.size} angles for {len(aircraft.hinges)} hinges")
+    lattice = lattice.at(angles)
     poses = [
         surface_pose(surface, angles[own])
         for surface, own in zip(aircraft.surfaces, aircraft.hinge_columns, strict=True)
@@ -319,7 +341,8 @@ def _reduced(
     uniform_flows : of `_uniform_flows`, in which a surface has its chordwise distribution of circulation.
     """
     motions = 2 * lattice.strips
-    strips = np.zeros((lattice.strips, STRIP_COLUMNS))
+    slides = any(surface.mouth_m is not None for surface in lattice.aircraft.surfaces)
+    strips = np.zeros((lattice.strips, STRIP_COLUMNS + SLIDING_COLUMNS * slides))
     inputs = circulation.shape[1]
     loads = np.zeros((lattice.operator_shape[0], inputs))
     ring, side0 = 0, lattice.rings
@@ -363,7 +386,10 @@ def _reduced(
                     on_edges[1], front * edges.front[..., 1], side * edges.side[..., 1]
                 ) - edges.summed(on_edges[2], front * edges.front[..., 0], side * edges.side[..., 0])
             loads[more + 1] = edges.moment(on_edges[0])
-        strips[strip0 : strip0 + part.spanwise] = edges.columns(surface.chord_W)
+        own = strips[strip0 : strip0 + part.spanwise]
+        own[:, :STRIP_COLUMNS] = edges.columns(surface.chord_W)
+        if surface.mouth_m is not None:
+            own[:, INBOARD : AREA_CHORD + 1] = strip_areas(surface, part)
     matrix = np.zeros(lattice.operator_shape)
     matrix[:, :motions] = loads[:, :motions]
     return LatticeOperator(matrix, strips, loads[:, motions:].copy())

@@ -108,7 +108,9 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
         for name, flown in flights.items()
         for angle in ANGLE_COLUMNS
     }
-    optimum = dict.fromkeys(sorted(curves.get("drives", SWEEPS)), schedules["optimum"]["sweep_rad"])
+    slides = "extension_m" in schedules["optimum"]
+    names = [f"{name}_m" if slides else name for name in sorted(curves.get("drives", SWEEPS))]
+    optimum = dict.fromkeys(names, schedules["optimum"]["extension_m" if slides else "sweep_rad"])
     return {
         "schedule.csv": _table({"t": time_s, **optimum}, SCHEDULE_DIGITS),
         "schedules.csv": _table({"time_s": time_s, **all_schedules}, SCHEDULE_DIGITS),
@@ -118,7 +120,7 @@ def schedule_tables(curves: Document) -> dict[str, bytes]:
 
 def drive_columns(document: Document) -> list[str]:
     """Names of the columns of a sample's or a flight's drives, as far as they exist."""
-    names = (f"{drive}_rad" for drive in document.get("drives", SWEEPS))
+    names = (f"{drive}_{unit}" for drive in document.get("drives", SWEEPS) for unit in ("rad", "m"))
     return [name for name in names if name in document]
 
 

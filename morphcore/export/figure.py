@@ -102,31 +102,35 @@ def draw(axes: Axes, time_s: Array, values: Array, **style: Any) -> None:
 
 
 def drive_panels(columns: Document, drives: Sequence[str] = SWEEPS) -> list[tuple[str, Array, Array]]:
-    """Contents of the drives' panels: for each word its label, and the left and right angles, rad.
+    """Contents of the drives' panels: for each word its label, and left and right in its unit, deg or m.
 
-    Columns are named ``<drive>_rad``. For a drive on one side only, both angles are its own, and the label
-    names the side.
+    Columns are named ``<drive>_rad`` or ``<drive>_m``. For a drive on one side only, both values are its own,
+    and the label names the side.
     """
     pairs: dict[str, dict[str, Array]] = {}
+    units: dict[str, str] = {}
     for name in drives:
+        word = without_side(name)
+        side = name.removeprefix(word).removeprefix("_")
         if f"{name}_rad" in columns:
-            word = without_side(name)
-            side = name.removeprefix(word).removeprefix("_")
-            pairs.setdefault(word, {})[side] = series(columns[f"{name}_rad"])
+            pairs.setdefault(word, {})[side] = np.degrees(series(columns[f"{name}_rad"]))
+        elif f"{name}_m" in columns:
+            pairs.setdefault(word, {})[side] = series(columns[f"{name}_m"])
+            units[word] = "m"
     panels = []
     for word, of_sides in pairs.items():
         angles = list(of_sides.values())
         alone = f" {next(iter(of_sides))}".rstrip() if len(of_sides) == 1 else ""
-        label = f"{printable(word)}{alone}".replace("_", " ")
+        label = f"{printable(word)}{alone}".replace("_", " ") + f", {units.get(word, 'deg')}"
         panels.append((label, of_sides.get("left", angles[0]), of_sides.get("right", angles[-1])))
     return panels
 
 
 def draw_drive(axes: Axes, time_s: Array, panel: tuple[str, Array, Array]) -> None:
-    """Draw a drive in degrees, both sides; one line if they are equal."""
+    """Draw a drive's panel, both sides; one line if they are equal."""
     label, left, right = panel
-    draw_sides(axes, time_s, np.degrees(left), np.degrees(right), np.degrees(SILENT_RAD))
-    label_axis(axes, f"{label}, deg")
+    draw_sides(axes, time_s, left, right, np.degrees(SILENT_RAD))
+    label_axis(axes, label)
 
 
 def draw_sides(axes: Axes, time_s: Array, left: Array, right: Array, alike: float) -> None:

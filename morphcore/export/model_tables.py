@@ -26,7 +26,9 @@ from 0 here (in MATLAB files from 1).
     y, edgewise about z, at the outboard link's origin; ``stiffness_nm_rad``, ``damping_nms_rad`` (j, 3).
 ``hinges``
     ``surface_index`` (h,); ``drive`` (h,) name of what moves it; ``position_m`` (h, 3) and ``axis`` (h, 3)
-    unit vector of a positive angle's right-handed rotation, in B; ``min_rad``, ``max_rad`` (h,).
+    unit vector of a positive angle's right-handed rotation, in B; ``min_rad``, ``max_rad`` (h,). Only of an
+    aircraft with prismatic hinges: ``slides`` (h,), for which the axis is the direction of a positive
+    extension, and range and ``hinge_rad`` are in m.
 ``controls``
     Only of an aircraft with control surfaces: ``surface_index`` (c,); ``drive`` (c,); ``from``, ``to`` (c,)
     shares of the span; ``chord_fraction`` (c,); ``sign`` (c,), 1 if a positive angle moves the trailing edge
@@ -205,6 +207,7 @@ def _hinges(aircraft: Aircraft) -> Table:
     """Hinges of each surface from the fuselage outward; each carries the following ones and the surface."""
     hinges = aircraft.hinges
     counts = [len(surface.hinges) for surface in aircraft.surfaces]
+    slides = np.array([hinge.prismatic for hinge in hinges], dtype=np.bool_)
     return {
         "surface_index": np.repeat(np.arange(len(counts)), counts),
         "drive": np.array([hinge.drive for hinge in hinges], dtype=np.str_),
@@ -212,6 +215,7 @@ def _hinges(aircraft: Aircraft) -> Table:
         "axis": np.array([hinge.axis_B for hinge in hinges]).reshape(-1, 3),
         "min_rad": np.array([hinge.min_rad for hinge in hinges]),
         "max_rad": np.array([hinge.max_rad for hinge in hinges]),
+        **({"slides": slides} if slides.any() else {}),
     }
 
 

@@ -30,6 +30,7 @@ from morphcore.export.figure import (
     stack,
     time_axis,
 )
+from morphdata.extensions import knot_values
 
 # Okabe & Ito's colours, also distinguished by line style
 STYLES: dict[str, dict[str, Any]] = {
@@ -76,22 +77,32 @@ def schedule_figure(document: Document, curves: Document) -> Figure:
     end_s = float(document["duration_s"])
     time_s = series(curves["time_s"])
     inside = time_s <= end_s * (1.0 + 1e-9)
+    drive = printable(str(curves.get("drive", "sweep"))).replace("_", " ")
+    slides = "knot_extension_m" in document["schedule"]
     quantities = (
-        ("sweep_rad", f"{printable(str(curves.get('drive', 'sweep'))).replace('_', ' ')}, deg", None),
+        ("sweep_rad", f"{drive}, deg", None),
         ("rate_rad_s", "rate, deg/s", "max_rate_rad_s"),
         ("acceleration_rad_s2", "acceleration, deg/s²", "max_accel_rad_s2"),
     )
+    if slides:
+        quantities = (
+            ("extension_m", f"{drive}, m", None),
+            ("rate_m_s", "rate, m/s", "max_rate_m_s"),
+            ("acceleration_m_s2", "acceleration, m/s²", "max_accel_m_s2"),
+        )
+    factor = 1.0 if slides else np.degrees(1.0)
     heights = [1.0, 0.8, 0.8]
     figure = Figure(figsize=(7.2, 1.3 + 1.75 * sum(heights)))
     rows = stack(figure, heights)
     for axes, (key, label, limit) in zip(rows, quantities, strict=True):
         label_axis(axes, label)
         for name, motion in shown.items():
-            draw(axes, time_s[inside], np.degrees(series(motion[key])[inside]), **STYLES[name])
-        _draw_limit(axes, document["limits"].get(limit) if limit else None)
-    times, angles = (np.array(document["schedule"][name]) for name in ("knot_time_s", "knot_sweep_rad"))
+            draw(axes, time_s[inside], factor * series(motion[key])[inside], **STYLES[name])
+        _draw_limit(axes, document["limits"].get(limit) if limit else None, factor)
+    found = document["schedule"]
+    times, values = np.array(found["knot_time_s"]), np.array(knot_values(found))
     rows[0].plot(
-        times, np.degrees(angles), linestyle="none", marker="o", markersize=3.5, color=BLUE, clip_on=False
+        times, factor * values, linestyle="none", marker="o", markersize=3.5, color=BLUE, clip_on=False
     )
     time_axis(figure, rows, time_s[inside])
     headline(figure, f"morph of {end_s:.3g} s: schedules")
@@ -161,12 +172,12 @@ def front_figure(document: Document) -> Figure:
 # pieces
 
 
-def _draw_limit(axes: Axes, limit: float | None) -> None:
+def _draw_limit(axes: Axes, limit: float | None, factor: float) -> None:
     """Draw lines at plus and minus a limit if the axis comes close to it."""
     if limit is None:
         return
     low, high = axes.get_ylim()
-    for value in (np.degrees(limit), -np.degrees(limit)):
+    for value in (factor * limit, -factor * limit):
         if 1.3 * min(low, 0.0) <= value <= 1.3 * high:
             axes.axhline(value, **LIMIT)
 

@@ -127,6 +127,11 @@ class Aircraft(Shown):
         return tuple(control for surface in self.surfaces for control in surface.controls)
 
     @property
+    def telescoping(self) -> list[str]:
+        """Names of the surfaces that telescope."""
+        return [surface.name for surface in self.surfaces if surface.mouth_m is not None]
+
+    @property
     def moved_parts(self) -> tuple[Hinge | Control, ...]:
         """What drives move, in the order of schedules: all hinges, then all controls."""
         return (*self.hinges, *self.controls)

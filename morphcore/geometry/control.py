@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphdata import controls as documents
-from morphdata.drives import ANGLE_TOLERANCE_RAD
+from morphdata.drives import ANGLE_TOLERANCE_RAD, Unit
 
 Array = NDArray[np.float64]
 
@@ -55,6 +55,26 @@ class Control:
             angle_rad=document.angle_rad,
             sign=document.sign(side),
         )
+
+    @property
+    def low(self) -> float:
+        """Smallest angle, rad."""
+        return self.min_rad
+
+    @property
+    def high(self) -> float:
+        """Largest angle, rad."""
+        return self.max_rad
+
+    @property
+    def held(self) -> float:
+        """Angle held if no history is given, rad."""
+        return self.angle_rad
+
+    @property
+    def unit(self) -> Unit:
+        """Of its history."""
+        return "rad"
 
     def beyond_range(self, angle_rad: Array) -> NDArray[np.int64]:
         """Rows of a history of angles (k,) that are out of range."""

@@ -14,6 +14,8 @@ from morphdata.lattice import DEFAULT_LATTICE
 Array = NDArray[np.float64]
 
 RING_FRONT = 0.25  # of panel chord: with the control point at 3/4, exact for the flat plate in two dimensions
+# three points integrate the chord squared of a tapered strip, and its drag area, exactly
+STRIP_POINTS, STRIP_WEIGHTS = np.polynomial.legendre.leggauss(3)
 CONTROL_POINT = 0.75  # of panel chord (Katz & Plotkin 2001, section 12.3; James 1972)
 
 
@@ -76,7 +78,8 @@ class SurfaceLattice:
     @property
     def panel_size_m(self) -> float:
         """Smaller of a panel's mean chord and width: the reference length of the core "line"."""
-        return min(self.mean_chord_m / self.chordwise, float(self.strip_edges_m[1]) * self.cos_sweep)
+        width = float(self.strip_edges_m[1] - self.strip_edges_m[0])
+        return min(self.mean_chord_m / self.chordwise, width * self.cos_sweep)
 
     @property
     def mean_chord_m(self) -> float:
@@ -85,10 +88,16 @@ class SurfaceLattice:
 
 
 def surface_lattice(
-    surface: Surface, chordwise: int = DEFAULT_LATTICE.chordwise, spanwise: int = DEFAULT_LATTICE.spanwise
+    surface: Surface,
+    chordwise: int = DEFAULT_LATTICE.chordwise,
+    spanwise: int = DEFAULT_LATTICE.spanwise,
+    hidden_m: float = 0.0,
 ) -> SurfaceLattice:
-    """Lattice of ``chordwise`` x ``spanwise`` panels of uniform spacing on a surface's mid-plane."""
-    edges = np.linspace(0.0, surface.length_m, spanwise + 1)
+    """Lattice of ``chordwise`` x ``spanwise`` panels of uniform spacing on a surface's mid-plane.
+
+    hidden_m : length from the root on that is inside another panel (`Surface.hidden_m`), without a lattice.
+    """
+    edges = np.linspace(hidden_m, surface.length_m, spanwise + 1)
     cos_sweep = float(surface.chord_W[0])
     middles = 0.5 * (edges[1:] + edges[:-1])
     rows = np.arange(chordwise)
@@ -132,6 +141,21 @@ def chord_points(surface: Surface, chord_fraction: Array, distance_m: Array) -> 
     return _points(
         surface, chord_fraction, distance_m, surface.chord_at(distance_m), surface.aft_at(distance_m)
     )
+
+
+def strip_areas(surface: Surface, part: SurfaceLattice) -> Array:
+    """What a telescoping surface's loads need of each strip: (strips, 4), columns INBOARD to AREA_CHORD.
+
+    Its ends, m from the root; its area weighted by `Surface.drag_share_at`, m^2; the integral of its chord
+    squared, m^3. See aero/kernels/loads.py.
+    """
+    inboard, outboard = part.strip_edges_m[:-1], part.strip_edges_m[1:]
+    half = 0.5 * (outboard - inboard)
+    at = 0.5 * (inboard + outboard) + half * STRIP_POINTS[:, None]
+    chord = surface.chord_at(at)
+    width = STRIP_WEIGHTS[:, None] * half * part.cos_sweep
+    area, squared = ((width * each).sum(axis=0) for each in (chord * surface.drag_share_at(at), chord**2))
+    return np.stack([inboard, outboard, area, squared], axis=1)
 
 
 def _means(values: Array) -> Array:

@@ -61,7 +61,11 @@ def panels_B(surface: Surface, hinge_rad: ArrayLike) -> list[Array]:
     Corners (4, 3) in B, around it from the inner leading edge, m. hinge_rad : (m,) of its hinges.
     """
     R_BW, r_B = surface_pose(surface, hinge_rad)
-    front, aft = chord_points(surface, np.array([0.0, 1.0]), surface.breaks_m) @ R_BW.T + r_B
+    ends = surface.breaks_m
+    hidden = surface.hidden_m(hinge_rad)
+    if hidden > 0.0:  # in another panel, from whose mouth the surface slides
+        ends = np.concatenate([[hidden], ends[ends > hidden]])
+    front, aft = chord_points(surface, np.array([0.0, 1.0]), ends) @ R_BW.T + r_B
     return [np.stack([front[a], front[a + 1], aft[a + 1], aft[a]]) for a in range(front.shape[0] - 1)]
 
 

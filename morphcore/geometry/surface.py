@@ -17,6 +17,7 @@ from morphcore.geometry.span_stations import SpanStations
 from morphcore.shown import Shown
 from morphdata import aircraft as documents
 from morphdata.aircraft import Material, Section
+from morphdata.telescopes import mouth_m, span_line_B
 
 Array = NDArray[np.float64]
 Side = Literal["right", "left"]
@@ -45,6 +46,8 @@ class Surface(Shown):
     are slopes of the mean line in its boundary condition. ``stations`` take precedence over the other fields;
     with them ``profile_drag`` is the mean over the area, and the elastic axis is still straight along y.
     ``cl_max`` and ``cl_min`` limit the lift coefficient of the sections; None: they do not stall.
+    ``mouth_m`` is the distance of the mouth from the root at zero extension if the surface telescopes, see
+    `hidden_m`; else None.
     """
 
     name: str
@@ -72,6 +75,7 @@ class Surface(Shown):
     controls: tuple[Control, ...] = ()
     cl_max: float | None = None
     cl_min: float | None = None
+    mouth_m: float | None = None
 
     @classmethod
     def of(cls, document: documents.Surface) -> Surface:
@@ -79,6 +83,7 @@ class Surface(Shown):
         root, tip = document.root_and_tip_chord_m
         x, y, z = document.root_m
         stations = SpanStations.of(document, lambda chord: _uniform_section(document, chord))
+        line_B = span_line_B(document)
         return cls(
             name=document.name,
             side=document.side,
@@ -90,7 +95,7 @@ class Surface(Shown):
             incidence_rad=document.incidence_rad,
             thickness_m=document.thickness_m,
             material=document.material,
-            hinges=tuple(Hinge.of(hinge, document.side) for hinge in document.all_hinges),
+            hinges=tuple(Hinge.of(hinge, document.side, line_B) for hinge in document.all_hinges),
             position_m=(x, y, z),
             flexible=document.flexible,
             profile_drag=document.profile_drag if stations is None else stations.profile_drag,
@@ -106,6 +111,7 @@ class Surface(Shown):
             ),
             cl_max=document.cl_max,
             cl_min=document.cl_min,
+            mouth_m=mouth_m(document),
         )
 
     @property
@@ -177,6 +183,15 @@ class Surface(Shown):
     def area_m2(self) -> float:
         """Planform area."""
         return self.span_m * self.mean_chord_m
+
+    def hidden_m(self, hinge_rad: ArrayLike) -> float:
+        """Length inboard of the mouth from which it slides, without air loads, m; 0 if it does not telescope.
+
+        hinge_rad : (m,) of its hinges; the last is the extension.
+        """
+        if self.mouth_m is None:
+            return 0.0
+        return max(self.mouth_m - float(np.asarray(hinge_rad, dtype=np.float64)[-1]), 0.0)
 
     def chord_at(self, distance_m: ArrayLike) -> Array:
         """Chord (m) at a distance from the root along the mid-chord line, shape of the input."""

@@ -107,7 +107,7 @@ def _stuck_warning(sample: Trajectory, pointer: str, name: str, run: Run | None)
     if run is None:
         return
     values = sample.drives[name] if name in sample.drives else getattr(sample, name)
-    at = f"{pointer}/{name}_rad"
+    at, unit = f"{pointer}/{sample.field_of(name)}", sample.units.get(name, "rad")
     value = float(values[run.first])
     if run.rows == values.size:
         yield ResultWarning(
@@ -126,7 +126,7 @@ def _stuck_warning(sample: Trajectory, pointer: str, name: str, run: Run | None)
         yield ResultWarning(
             "clipped_column",
             f"the column {name} of sample {sample.name!r} stays at its {end_of_range} value, "
-            f"{value:.4g} rad, from {begin:.2f} s to {end:.2f} s although the aircraft turns on",
+            f"{value:.4g} {unit}, from {begin:.2f} s to {end:.2f} s although the aircraft turns on",
             "the sensor or the record is probably saturated (clipped) there: leave those rows out, or record "
             "the flight with a wider range",
             at,
@@ -134,8 +134,8 @@ def _stuck_warning(sample: Trajectory, pointer: str, name: str, run: Run | None)
         return
     yield ResultWarning(
         "frozen_column",
-        f"the column {name} of sample {sample.name!r} stands still at {value:.4g} rad from {begin:.2f} s to "
-        f"{end:.2f} s while the aircraft moves",
+        f"the column {name} of sample {sample.name!r} stands still at {value:.4g} {unit} from {begin:.2f} s "
+        f"to {end:.2f} s while the aircraft moves",
         "the record is probably frozen there (a lost link, a sensor that hangs): leave those rows out",
         at,
     )

@@ -122,12 +122,13 @@ def sample_schedules(aircraft: Aircraft, sample: Trajectory, pointer: str) -> li
             angle = schedule.motion(sample.time_s).angle
             bad = hinge.beyond_range(angle)
             if bad.size:
-                unit = f"; are they degrees? Then name the column {key}_deg"
+                turns = hinge.unit == "rad" and bool(np.abs(angle).max() > np.pi)
+                unit = f"; are they degrees? Then name the column {key}_deg" if turns else ""
                 raise InvalidInput(
-                    f"{hinge.drive} {angle[bad[0]]:g} rad is beyond the {part_name(hinge)} of {surface.name}",
-                    pointer=f"{pointer}/{key}_rad/{bad[0]}",
-                    hint=f"its range is {hinge.min_rad:g}..{hinge.max_rad:g} rad"
-                    + unit * bool(np.abs(angle).max() > np.pi),
+                    f"{hinge.drive} {angle[bad[0]]:g} {hinge.unit} is beyond the {part_name(hinge)} of "
+                    f"{surface.name}",
+                    pointer=f"{pointer}/{sample.field_of(key)}/{bad[0]}",
+                    hint=f"its range is {hinge.min_rad:g}..{hinge.max_rad:g} {hinge.unit}{unit}",
                 )
     return hinge_schedules(aircraft, followed)
 

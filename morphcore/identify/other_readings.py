@@ -103,9 +103,9 @@ def drive_readings(sample: Trajectory) -> list[Reading]:
     words = _words(sample)
     for names in words.values():
         found += _unit_readings(sample, names)
-        found.append(_flipped(names))
+        found.append(_flipped(sample, names))
         if len(names) > 1:
-            found += [_flipped([name]) for name in names]
+            found += [_flipped(sample, [name]) for name in names]
     if any(len(names) > 1 for names in words.values()):
         found.append(
             Reading(
@@ -147,6 +147,9 @@ def _time_readings(sample: Trajectory) -> list[Reading]:
 
 
 def _unit_readings(sample: Trajectory, names: Sequence[str]) -> list[Reading]:
+    names = [name for name in names if sample.units.get(name, "rad") == "rad"]
+    if not names:
+        return []
     largest = max(float(np.abs(sample.drives[name]).max()) for name in names)
     if largest > SMALL_ANGLE_RAD:
         factor, said, hint = (
@@ -168,14 +171,14 @@ def _unit_readings(sample: Trajectory, names: Sequence[str]) -> list[Reading]:
     ]
 
 
-def _flipped(names: Sequence[str]) -> Reading:
+def _flipped(sample: Trajectory, names: Sequence[str]) -> Reading:
     label = " and ".join(names)
     return Reading(
         "flipped_sign",
         lambda given: _moved(given, names, lambda angle: -angle),
         f"the sign of {label} is probably wrong in {{name}}: with the opposite one the model flies it",
         f"change the sign of {label}, or check the axis of the hinges in the aircraft",
-        f"{names[0]}_rad",
+        sample.field_of(names[0]),
     )
 
 

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.models.equivalent import ChainModel, ParameterBatch, fitted, physical_guess
-from morphcore.models.parameters import CutSurface, Parameter
+from morphcore.models.parameters import Parameter
+from morphcore.models.surface_rows import CutSurface
 from morphcore.models.transforms import Transform
 from morphcore.search.solver import Box
 from morphdata.faults import refuse

@@ -116,13 +116,14 @@ def cut_off_warnings(
 
 def _cut_off_warning(sample: Trajectory, pointer: str, name: str, row: int) -> ResultWarning:
     angle, time_s = float(sample.drives[name][row]), float(sample.time_s[row])
+    unit = sample.units.get(name, "rad")
     return ResultWarning(
         "clipped_column",
-        f"the drive {name} of sample {sample.name!r} stops abruptly at {angle:.4g} rad at t = {time_s:.2f} s,"
-        " but the aircraft moves as if it went on",
+        f"the drive {name} of sample {sample.name!r} stops abruptly at {angle:.4g} {unit} at t = "
+        f"{time_s:.2f} s, but the aircraft moves as if it went on",
         "the sensor or the record is probably saturated (clipped) there: leave out the rows after it, or "
         "record the flight with a wider range",
-        f"{pointer}/{name}_rad/{row}",
+        f"{pointer}/{sample.field_of(name)}/{row}",
     )
 
 

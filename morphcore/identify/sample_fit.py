@@ -100,7 +100,7 @@ class SampleFit(Shown):
             "time_s": sample.time_s.tolist(),
             "sweep_left_rad": sample.sweep_left.tolist(),
             "sweep_right_rad": sample.sweep_right.tolist(),
-            **{f"{name}_rad": sample.drives[name].tolist() for name in sample.drive_order},
+            **{sample.field_of(name): sample.drives[name].tolist() for name in sample.drive_order},
             "drives": list(sample.drive_order),
             "measured": angles(sample.euler),
             "rigid": angles(self.rigid),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.aero.bent_shape import BentShape
-from morphcore.aero.kernels.loads import L_MOMENT
+from morphcore.aero.kernels.loads import L_MOMENT, LINKS, PAIR0, STRIPS, TELESCOPES
 from morphcore.aero.operator import AircraftLattice, aircraft_lattice
 from morphcore.aero.vlm import prandtl_glauert
 from morphcore.errors import InvalidInput
@@ -27,10 +27,12 @@ from morphcore.models.kernels.layout import (
     MOMENT_C,
     axis_rows_of_scratch,
     state_rows,
+    visible_rows_of_scratch,
 )
 from morphcore.models.links import link_edges
 from morphcore.models.parameter_batch import ParameterBatch
-from morphcore.models.parameters import CHAIN_PARAMETERS, CutSurface, Parameter, SurfaceRows
+from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter
+from morphcore.models.surface_rows import CutSurface, SurfaceRows
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.shown import Shown
 from morphdata.faults import refuse
@@ -44,6 +46,7 @@ from morphdata.links import (
     means,
 )
 from morphdata.refusals import escaped
+from morphdata.telescopes import unsupported_faults
 
 __all__ = [
     "ChainModel",
@@ -71,9 +74,10 @@ class ChainModel(Shown):
     """Topology and lattice of an equivalent (or rigid) model, shared by all its parameter sets.
 
     links_per_wing : links of each flexible surface, by name where they differ.
-    surfaces : (s, 11) first link, links, first strip, strips, first overlap pair of each surface; whether it
+    surfaces : (s, 12) first link, links, first strip, strips, first overlap pair of each surface; whether it
         also represents its mirror image; the first of its further outputs of the lattice (or -1); its
-        `AircraftLattice.control_inputs`; whether it carries point masses.
+        `AircraftLattice.control_inputs`; whether it carries point masses; the sign of its span if it
+        telescopes, else 0.
     """
 
     aircraft: Aircraft
@@ -152,7 +156,11 @@ class ChainModel(Shown):
     @property
     def scratch_rows(self) -> int:
         """Number of rows of a block's scratch."""
-        return int(axis_rows_of_scratch(self.links, self.coordinates)[-1])
+        rows = int(axis_rows_of_scratch(self.links, self.coordinates)[-1])
+        if not self.surfaces[:, TELESCOPES].any():
+            return rows
+        pairs = self.surfaces[-1, PAIR0] + self.surfaces[-1, LINKS] * self.surfaces[-1, STRIPS]
+        return int(visible_rows_of_scratch(self.links, self.coordinates)[-1] + 2 * pairs)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -322,6 +330,11 @@ def chain_model(
     links: LinksPerWing = checked if by_name else checked[""]
     counts, faults = links_of(links, names, flexible, pairs, pointer)
     refuse(faults)
+    refuse(
+        unsupported_faults(
+            aircraft.telescoping, apparent_mass=flight.apparent_mass, lattice_shape=lattice.shape
+        )
+    )
     steep = lift_coefficient(aircraft, flight) > STEEP_LIFT
     if by_name:
         bent = [k for k, bends in enumerate(flexible) if bends]
@@ -345,7 +358,9 @@ def _chain_model(
         aircraft.surfaces, lattices.lattices, lattices.strip0, lattices.control_inputs, counts, strict=True
     ):
         more, lumped = lattices.more_rows(strip0), int(bool(surface.point_masses))
-        rows.append([link, count, strip0, part.spanwise, pair, int(bool(images)), more, *controls, lumped])
+        slides = 0 if surface.mouth_m is None else int(surface.span_sign)
+        seats = [strip0, part.spanwise, pair, int(bool(images)), more]
+        rows.append([link, count, *seats, *controls, lumped, slides])
         link += count
         pair += count * part.spanwise
     return ChainModel(aircraft, flight, lattices, links_per_wing, np.array(rows, dtype=np.int64))

@@ -26,12 +26,22 @@ from morphcore.geometry.fields import whole_number
 from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.section import SectionProperties
 from morphcore.geometry.surface import Surface
+from morphcore.models.kernels.telescope import HELD
 from morphcore.models.links import POINTS, WEIGHTS
 from morphcore.models.lumps import beam_lumps, moved_inertia, surface_lumps
 from morphcore.models.span_quadrature import span_points
-from morphcore.multibody.beam import GAUSS, GAUSS_WEIGHTS, Beams, Section, make_beams
+from morphcore.multibody.beam import (
+    GAUSS,
+    GAUSS_WEIGHTS,
+    Beams,
+    Section,
+    flexibility_parts,
+    make_beams,
+)
+from morphdata.faults import refuse
 from morphdata.lattice import DEFAULT_LATTICE, Lattice
 from morphdata.simulate import DEFAULT_ELEMENTS, MAX_ELEMENTS
+from morphdata.telescopes import unsupported_faults
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -46,7 +56,8 @@ class FlexibleModel:
     roots, tips : (s,) first and last node of each surface. rest_W : (n, 3) nodes of the unbent surfaces from
     their root node, in W, m. riders : the lattice on sections; element, fraction : (k,) where these are
     (element -1 - i is node i itself). apparent : (n, 6, 6) apparent mass of the air at the nodes, kg and m;
-    (0, 6, 6) if the flight has none.
+    (0, 6, 6) if the flight has none. compliances : (e, 3, 6, 6) what each Gauss point adds to an element's
+    flexibility, (0, ...) if no surface telescopes.
     """
 
     aircraft: Aircraft
@@ -60,6 +71,35 @@ class FlexibleModel:
     element: IntArray
     fraction: Array
     apparent: Array
+    compliances: Array
+
+    def held(self, angles: Array) -> Array:
+        """Stiffness (e, 6, 6) of the elements at angles (h,) of all hinges: hidden parts are held straight.
+
+        Each Gauss point stands for the stretch of the element of its weight: it bends as far as that is
+        visible, and otherwise HELD times as much.
+        """
+        stiffness, first = self.beams.stiffness.copy(), 0
+        ends = np.cumsum([0.0, *GAUSS_WEIGHTS])
+        for surface, own, count in zip(
+            self.aircraft.surfaces, self.aircraft.hinge_columns, self.tips - self.roots, strict=True
+        ):
+            hidden = surface.hidden_m(angles[own]) / surface.length_m * count
+            for e in range(min(int(np.ceil(hidden)), count)):
+                seen = np.clip((e + ends[1:] - hidden) / GAUSS_WEIGHTS, HELD, 1.0)
+                total = np.einsum("g,gij->ij", seen, self.compliances[first + e])
+                stiffness[first + e] = np.linalg.inv(total)
+            first += count
+        return stiffness
+
+    def at(self, angles: Array) -> FlexibleModel:
+        """The model with the lattice that it has at angles (h,) of all hinges: it slides with their spans."""
+        lattice = self.lattice.at(angles)
+        if lattice is self.lattice:
+            return self
+        riders, element, fraction = _seats(self.aircraft, self.flight, lattice, self.roots, self.tips)
+        riders = replace(riders, control_slope=self.riders.control_slope)
+        return replace(self, lattice=lattice, riders=riders, element=element, fraction=fraction)
 
 
 def flexible_model(
@@ -76,22 +116,24 @@ def flexible_model(
     InvalidInput : the number of elements is out of range.
     """
     elements = whole_number(elements, "elements", pointer="/model/elements", minimum=1, maximum=MAX_ELEMENTS)
+    refuse(
+        unsupported_faults(
+            aircraft.telescoping, apparent_mass=flight.apparent_mass, lattice_shape=lattice.shape
+        )
+    )
     parts = aircraft_lattice(aircraft, lattice)
     ends: list[list[int]] = []
     rest, sections, damping = [], [], []
     bodies, inertia = [0], [fuselage_inertia(aircraft.fuselage)]
     roots, tips, rest_W = [], [], [np.zeros((1, 3))]
-    riders, places, apparent = [], [], [np.zeros((1, 6, 6))]
+    apparent = [np.zeros((1, 6, 6))]
     node = 1
-    for surface, part in zip(aircraft.surfaces, parts.lattices, strict=True):
+    for surface in aircraft.surfaces:
         count = elements if surface.flexible else 0
         roots.append(node)
         tips.append(node + count)
         stations = np.linspace(0.0, surface.length_m, count + 1)
         rest_W.append(stations[:, None] * np.array([0.0, surface.span_sign, 0.0]))
-        place = _section_places(surface, part, node, len(ends), count)
-        places.append(place[:2])
-        riders.append(_riders(surface, part, flight, place[2]))
         on_points, on_nodes = beam_lumps(surface, count)
         for e in range(count):
             ends.append([node + e, node + e + 1])
@@ -108,6 +150,8 @@ def flexible_model(
         if flight.apparent_mass:
             apparent.append(_apparent_at(surface, flight, stations))
     slopes = panel_slopes(parts.slopes, len(aircraft.controls), parts.lattices)
+    first, last = np.array(roots, dtype=np.int64), np.array(tips, dtype=np.int64)
+    riders, element, fraction = _seats(aircraft, flight, parts, first, last)
     beams = make_beams(
         np.array(ends).reshape(-1, 2), rest, sections, damping, bodies=bodies, inertia=inertia, nodes=node
     )
@@ -116,13 +160,14 @@ def flexible_model(
         flight=flight,
         lattice=parts,
         beams=beams,
-        roots=np.array(roots, dtype=np.int64),
-        tips=np.array(tips, dtype=np.int64),
+        roots=first,
+        tips=last,
         rest_W=np.concatenate(rest_W),
-        riders=replace(_joined(riders), control_slope=slopes, limits=_circulation_limits(parts)),
-        element=np.concatenate([element for element, _ in places]),
-        fraction=np.concatenate([fraction for _, fraction in places]),
+        riders=replace(riders, control_slope=slopes, limits=_circulation_limits(parts)),
+        element=element,
+        fraction=fraction,
         apparent=np.concatenate(apparent)[0 if flight.apparent_mass else 1 :],
+        compliances=_compliances(aircraft, rest, sections),
     )
 
 
@@ -131,6 +176,32 @@ def _circulation_limits(parts: AircraftLattice) -> Array:
     limits = lift_limits(parts.aircraft.surfaces, parts.lattices)
     chords = np.concatenate([lattice.strip_chord_m for lattice in parts.lattices])
     return 0.5 * chords[: limits.shape[0], None] * limits
+
+
+def _compliances(aircraft: Aircraft, rest: list[list[float]], sections: list[list[Section]]) -> Array:
+    """See `FlexibleModel.compliances`."""
+    if all(surface.mouth_m is None for surface in aircraft.surfaces):
+        return np.zeros((0, GAUSS.size, 6, 6))
+    return np.array(
+        [
+            flexibility_parts(np.array(each[3:]), [section.stiffness for section in own])
+            for each, own in zip(rest, sections, strict=True)
+        ]
+    ).reshape(-1, GAUSS.size, 6, 6)
+
+
+def _seats(
+    aircraft: Aircraft, flight: Flight, lattice: AircraftLattice, roots: IntArray, tips: IntArray
+) -> tuple[Riders, IntArray, Array]:
+    """Riders of the whole lattice, and element and fraction (k,) of their sections; see `FlexibleModel`."""
+    riders, elements, fractions, first = [], [], [], 0
+    for surface, part, root, tip in zip(aircraft.surfaces, lattice.lattices, roots, tips, strict=True):
+        element, fraction, origin_W = _section_places(surface, part, int(root), first, int(tip - root))
+        elements.append(element)
+        fractions.append(fraction)
+        riders.append(_riders(surface, part, flight, origin_W))
+        first += int(tip - root)
+    return _joined(riders), np.concatenate(elements), np.concatenate(fractions)
 
 
 def _apparent_at(surface: Surface, flight: Flight, stations: Array) -> Array:
@@ -252,7 +323,11 @@ def _section_places(
     place = distance / surface.length_m * elements
     inside = np.minimum(np.floor(place + 1e-12), elements - 1)
     origin_W = distance[:, None] * np.array([0.0, surface.span_sign, 0.0])
-    return first_element + inside.astype(np.int64), place - inside, origin_W
+    element, fraction = first_element + inside.astype(np.int64), place - inside
+    if surface.mouth_m is not None:
+        # up to the mouth the panel is straight: its visible root leaves no gap to the inner panel
+        element[0], fraction[0], origin_W[0] = -1 - root, 0.0, 0.0
+    return element, fraction, origin_W
 
 
 def _riders(surface: Surface, part: SurfaceLattice, flight: Flight, origin_W: Array) -> Riders:

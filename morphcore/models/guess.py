@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from morphcore.errors import InvalidInput
 from morphcore.models.links import beam_division
 from morphcore.models.parameter_batch import ParameterBatch, together
-from morphcore.models.parameters import CutSurface
+from morphcore.models.surface_rows import CutSurface
 from morphdata.faults import refuse
 from morphdata.links import by_pair, shown_links, shown_per_wing
 

@@ -14,7 +14,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.apparent_mass import apparent_inertia
 from morphcore.aero.kernels.loads import (
     JONES_B1,
     JONES_B2,
@@ -33,8 +32,6 @@ from morphcore.aero.kernels.loads import (
     L_SLOW_DECAY,
     L_TURN_Y,
 )
-from morphcore.geometry.aircraft import Flight
-from morphcore.geometry.lattice import SurfaceLattice
 from morphcore.geometry.surface import Surface
 from morphcore.models.links import (
     MASS_ROWS,
@@ -44,12 +41,14 @@ from morphcore.models.links import (
     link_edges,
     link_masses,
     moment_areas,
+    segment_ends,
     strip_overlap,
     twist_slopes,
 )
 from morphcore.models.lumps import FLAT_ROWS, LUMP_ROWS, link_lumps
+from morphcore.models.surface_rows import CutSurface, SurfaceRows
 from morphcore.models.transforms import Linear, Log, Shares, Transform
-from morphcore.multibody.kernels.articulated import L_APPARENT, L_MASS, L_OFFSET, L_UP
+from morphcore.multibody.kernels.articulated import L_MASS, L_OFFSET, L_UP
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -83,65 +82,6 @@ CM0_UNIT = 0.02
 CM0_LIMITS = (-0.5, 0.5)
 DIVISION_LIMIT_RATIO = 3.0  # of the log-ratios: a share over the last one 20 times smaller or larger
 SHORTEST_LAG_S = 1e-9  # shorter lags are quasi-steady; avoids a division by zero
-
-
-@dataclass(frozen=True)
-class CutSurface:
-    """A surface in its flight condition, cut into links.
-
-    Attributes
-    ----------
-    surface : Surface
-    flight : Flight
-    division : ndarray, shape (p, n)
-        Shares of the span of the links of p models, which sum to one.
-    """
-
-    surface: Surface
-    flight: Flight
-    division: Array
-
-    @property
-    def edges(self) -> Array:
-        """Ends of the links (p, n + 1), distances from the root in m."""
-        return link_edges(self.division, self.surface.length_m)
-
-
-@dataclass
-class SurfaceRows:
-    """The kernel constants of one surface's links, into which parameters are written.
-
-    Attributes
-    ----------
-    surface : Surface
-    part : SurfaceLattice
-    step_s : float
-        Time step, s.
-    links : ndarray, shape (p, n, LINK_ROWS)
-        Rows as named in articulated.py and loads.py (``L_...``).
-    stiffness, damping : ndarray, shape (p, 3 (n - 1))
-        Of flap, torsion and edgewise of each gimbal, N m/rad and N m s/rad.
-    overlap : ndarray, shape (p, 2 strips n)
-        For each strip and link, the share of the strip and the middle of that share in link axes, m.
-    touched : ndarray of int, shape (p, n, 2)
-        First strip of each link, and the one after its last.
-    """
-
-    surface: Surface
-    part: SurfaceLattice
-    step_s: float
-    links: Array
-    stiffness: Array
-    damping: Array
-    overlap: Array
-    touched: IntArray
-
-    def add_apparent_mass(self, edges: Array, flight: Flight) -> None:
-        """Write the apparent inertia of links with these ends (p, n + 1), m."""
-        start, end = edges[:, :-1], edges[:, 1:]
-        found = apparent_inertia(self.surface, flight.air_density_kg_m3, start, end, start)
-        rows, columns = np.triu_indices(3)
-        self.links[:, :, L_APPARENT : L_APPARENT + 6] = found[..., rows, columns]
 
 
 @dataclass(frozen=True)
@@ -279,6 +219,11 @@ def _cut(rows: SurfaceRows, division: Array) -> None:
     rows.links[:, :, L_CHORD_X], rows.links[:, :, L_CHORD_Y], rows.links[:, :, L_SKEW] = x, y, y / x
     weight, middle = strip_overlap(surface, rows.part, edges)
     rows.overlap[:] = np.stack([weight, middle], axis=-1).reshape(particles, -1)
+    if surface.mouth_m is not None:  # models/kernels/telescope.py: areas of strips, each strip on any link
+        rows.links[:, :, [L_DRAG, L_MOMENT]] = 1.0
+        rows.links[:, :-1, L_DRAG_Y] = segment_ends(surface, edges)[:, 1:]
+        rows.touched[:, :, 0], rows.touched[:, :, 1] = 0, rows.part.spanwise
+        return
     is_touched = weight > 0.0
     rows.touched[:, :, 0] = np.argmax(is_touched, axis=1)
     rows.touched[:, :, 1] = rows.part.spanwise - np.argmax(is_touched[:, ::-1], axis=1)

@@ -180,13 +180,20 @@ def element_flexibility(along: Array, section_stiffness: Sequence[Array]) -> Arr
     ----------
     along : (3,) from inner to outer node at rest, m. section_stiffness : (6, 6) at each Gauss point.
     """
-    length = float(np.sqrt(along @ along))
     total = np.zeros((6, 6))
+    for part in flexibility_parts(along, section_stiffness):
+        total += part
+    return total
+
+
+def flexibility_parts(along: Array, section_stiffness: Sequence[Array]) -> list[Array]:
+    """What each Gauss point adds to `element_flexibility`."""
+    length, parts = float(np.sqrt(along @ along)), []
     for s, weight, stiffness in zip(GAUSS, GAUSS_WEIGHTS, section_stiffness, strict=True):
         B = np.eye(6)
         B[:3, 3:] = -(s - 0.5) * skew(along)
-        total += weight * length * B.T @ np.linalg.solve(stiffness, B)
-    return total
+        parts.append(weight * length * B.T @ np.linalg.solve(stiffness, B))
+    return parts
 
 
 def node_forces(

@@ -56,8 +56,9 @@ def relative_motion(
             twist, acceleration = own, change
             continue
         turn = hinge.rotation(angles[:, place])
-        twist = _carried(turn, arm, twist)
-        acceleration = _carried(turn, arm, acceleration) + _cross(twist, own) + change
+        shift = hinge.moved(angles[:, place], turn, arm) - arm
+        twist = _carried(turn, shift, twist)
+        acceleration = _carried(turn, shift, acceleration) + _cross(twist, own) + change
         twist = twist + own
     return _in_wing_axes(rest, twist), _in_wing_axes(rest, acceleration)
 
@@ -70,8 +71,9 @@ def hinge_screws(hinges: Sequence[Hinge], arms: Array, angles: Array, rest: Arra
     out = np.empty((angles.shape[0], len(hinges), 6))
     for place, (hinge, arm) in enumerate(zip(hinges, arms, strict=False)):
         turn = hinge.rotation(angles[:, place])
+        shift = hinge.moved(angles[:, place], turn, arm) - arm
         for inner in range(place):
-            out[:, inner] = _carried(turn, arm, out[:, inner])
+            out[:, inner] = _carried(turn, shift, out[:, inner])
         out[:, place] = _screw(hinge, arm)
     return _in_wing_axes(rest, out)
 
@@ -83,17 +85,19 @@ def _in_wing_axes(rest: Array, motion: Array) -> Array:
 
 def _screw(hinge: Hinge, arm: Array) -> Array:
     """Twist (6,) of the parts outboard of a hinge for its unit rate, at a point ``arm`` from its axis."""
+    if hinge.prismatic:
+        return np.concatenate([np.zeros(3), hinge.axis_B])
     return np.concatenate([hinge.axis_B, np.cross(hinge.axis_B, arm)])
 
 
-def _carried(turn: Array, arm: Array, motion: Array) -> Array:
+def _carried(turn: Array, shift: Array, motion: Array) -> Array:
     """Motion vectors (k, 6) of the parts inboard of a hinge, transformed to its outboard frame.
 
-    turn : (k, 3, 3) of the hinge. arm : (3,) from its axis to the point; both frames have their origins at
-    that point at rest, and the hinge has moved the outer one's by ``turn arm - arm``.
+    turn : (k, 3, 3) of the hinge. shift : (k, 3) by which it has moved the outer frame's origin: both frames
+    have theirs at the same point at rest.
     """
     angular, linear = motion[:, :3], motion[:, 3:]
-    moved = linear + np.cross(angular, turn @ arm - arm)
+    moved = linear + np.cross(angular, shift)
     return np.concatenate([np.einsum("kji,kj->ki", turn, part) for part in (angular, moved)], axis=1)
 
 

@@ -16,7 +16,7 @@ from morphcore.optimise.feasible import constant_rate, morph_drives, morph_space
 from morphcore.optimise.flights import MorphFlights, sample_times
 from morphcore.optimise.goals import ModelName
 from morphcore.optimise.limits import MorphSpace
-from morphcore.simulate.plan import CommonPath, common_path, path_schedules
+from morphcore.simulate.common_path import CommonPath, common_path, path_schedules
 from morphcore.simulate.schedule import Schedule
 from morphcore.simulate.step_choice import busiest_part, choose_step
 from morphcore.simulate.trim import StartMode
@@ -54,7 +54,7 @@ class MorphCase:
         step_s: float | None,
     ) -> None:
         self.aircraft, self.flight, self.parameters = aircraft, flight, model
-        self.morph, self.limits = morph, limits
+        self.morph, self.limits = morph, limits.in_unit(morph.unit)
         self.lattice, self.start, self._step_s = lattice, start, step_s
         self._flights: dict[ModelName, MorphFlights] = {}
         if model.particles != 1:
@@ -77,10 +77,10 @@ class MorphCase:
         """The lattice over all angles that a schedule may reach, shared by all models and durations."""
         space, morph = self.space(self.morph.duration_s), self.morph
         low, high = (0.0, 1.0) if self.limits.monotonic else (space.low, space.high)
-        ends = sorted(morph.initial_rad + morph.change_rad * share for share in (low, high))
+        ends = sorted(morph.begin + morph.change * share for share in (low, high))
         return common_path(
             self.chain("rigid")[0], *ends, drives=self.drives, may_halve=self.is_even, start=self.start,
-            initial_rad=morph.initial_rad,
+            initial_rad=morph.begin,
         )  # fmt: skip
 
     @property
@@ -151,7 +151,7 @@ class MorphCase:
                 batch,
                 self.path,
                 self.times_s,
-                initial_rad=self.morph.initial_rad,
+                initial_rad=self.morph.begin,
                 start=self.start,
                 step_s=self.step_s,
             )

@@ -12,6 +12,9 @@ from morphcore.geometry.aircraft import Aircraft
 from morphcore.optimise.limits import HELD, MorphSpace
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
 from morphdata.controls import unmotorised
+from morphdata.drives import wrong_unit
+from morphdata.extensions import SLIDING_LIMITS
+from morphdata.faults import refuse
 from morphdata.optimize import Limits, Morph
 
 OVERSHOOT = 0.5  # of the change: how far a schedule that may reverse may go beyond either end
@@ -34,15 +37,20 @@ def morph_space(aircraft: Aircraft, morph: Morph, limits: Limits, duration_s: fl
             hint="leave it out: only hinges have a limit of their torque",
         )
     minimum, maximum = max(hinge.min_rad for hinge in hinges), min(hinge.max_rad for hinge in hinges)
-    for name in ("initial_rad", "final_rad"):
-        angle = getattr(morph, name)
+    unit = hinges[0].unit
+    refuse(
+        [wrong_unit(aircraft.drives[drives[0]], morph.unit, f"/morph/final_{morph.unit}")]
+        if unit != morph.unit
+        else []
+    )
+    for name, angle in ((f"initial_{unit}", morph.begin), (f"final_{unit}", morph.end)):
         if any(hinge.beyond_range(np.array([angle])).size for hinge in hinges):
             raise InvalidInput(
-                f"{name} {angle:g} is beyond the hinges' range {minimum:g}..{maximum:g} rad",
+                f"{name} {angle:g} is beyond the hinges' range {minimum:g}..{maximum:g} {unit}",
                 pointer=f"/morph/{name}",
-                hint="choose an angle inside, or widen the hinges' min_rad and max_rad",
+                hint=f"choose a value inside, or widen the hinges' min_{unit} and max_{unit}",
             )
-    stops = sorted((stop - morph.initial_rad) / morph.change_rad for stop in (minimum, maximum))
+    stops = sorted((stop - morph.begin) / morph.change for stop in (minimum, maximum))
     return MorphSpace(
         morph,
         limits,
@@ -98,11 +106,12 @@ def require_schedules(space: MorphSpace) -> None:
     # the rate goes with 1 / T, the acceleration with 1 / T^2
     power = 1 if name == "max_rate_rad_s" else 2
     enough = value * max(needed[name] / space.duration_s, 1.0) ** power
-    loosen = f", or raise {name} to {rounded_up(enough):g} or more" if enough > value else ""
+    shown = name if space.morph.unit == "rad" else SLIDING_LIMITS[name]
+    loosen = f", or raise {shown} to {rounded_up(enough):g} or more" if enough > value else ""
     raise InvalidInput(
-        f"{abs(space.morph.change_rad):g} rad in {space.duration_s:g} s on {space.morph.knots} knots breaks "
-        f"{name} = {value:g}: with these limits it takes {rounded_up(shortest):g} s",
-        pointer=f"/limits/{name}",
+        f"{abs(space.morph.change):g} {space.morph.unit} in {space.duration_s:g} s on {space.morph.knots} "
+        f"knots breaks {shown} = {value:g}: with these limits it takes {rounded_up(shortest):g} s",
+        pointer=f"/limits/{shown}",
         hint=f"raise duration_s to {rounded_up(shortest):g} or more{loosen}",
     )
 
@@ -114,7 +123,7 @@ def constant_rate(morph: Morph, limits: Limits, duration_s: float) -> ConstantRa
     ``change / (T - r)`` and the acceleration ``change / (T - r) / r``. It exists whenever a spline satisfies
     the limits, since no schedule needs less time than the trapezoid.
     """
-    change = abs(morph.change_rad)
+    change = abs(morph.change)
     minimum, maximum = 0.0, 0.5 * duration_s
     if limits.max_accel_rad_s2 is not None:
         # ramp times remaining time must be at least change / acceleration
@@ -125,7 +134,7 @@ def constant_rate(morph: Morph, limits: Limits, duration_s: float) -> ConstantRa
     # a small margin, so that round-off cannot break the limit
     minimum, maximum = minimum * (1.0 + HELD), max(maximum * (1.0 - HELD), 0.0)
     ramp = float(np.clip(min(USUAL_RAMP_S, 0.25 * duration_s), minimum, max(minimum, maximum)))
-    return ConstantRate(morph.initial_rad, morph.final_rad, duration_s, ramp_s=min(ramp, 0.5 * duration_s))
+    return ConstantRate(morph.begin, morph.end, duration_s, ramp_s=min(ramp, 0.5 * duration_s))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from morphcore.models.kinematics import tip_bending
 from morphcore.models.soft_joints import chain_obstacle
 from morphcore.simulate.batch import fly_batch
 from morphcore.simulate.chain_motion import chain_motion
-from morphcore.simulate.plan import CommonPath
+from morphcore.simulate.common_path import CommonPath
 from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.steady import departure
 from morphcore.simulate.time_grid import time_grid

@@ -92,8 +92,8 @@ class MorphSpace:
     def schedule(self, point: Array) -> Spline:
         """The schedule of one point (d,)."""
         time, value = self.knots(point[None, :])
-        angle = self.morph.initial_rad + self.morph.change_rad * value[0]
-        angle[-1] = self.morph.final_rad
+        angle = self.morph.begin + self.morph.change * value[0]
+        angle[-1] = self.morph.end
         return Spline(self.duration_s * time[0], angle)
 
     def slack(self, points: Array) -> Array:
@@ -105,7 +105,7 @@ class MorphSpace:
         not; likewise in the last.
         """
         shapes = self.shapes(points)
-        steepness = abs(self.morph.change_rad) / self.duration_s  # mean rate, rad/s
+        steepness = abs(self.morph.change) / self.duration_s  # mean rate, rad/s
         turning, inner = shapes.turning_rate(), shapes.rate[:, 1:-1]
         rates = np.concatenate([turning, inner], axis=1)
         kept = [self.inner * (np.diff(shapes.time, axis=1) - SHORTEST_PIECE)]
@@ -129,7 +129,7 @@ class MorphSpace:
         """(p,) largest acceleration of points (p, d), rad/s^2."""
         shapes = self.shapes(points)
         peak = np.abs(np.concatenate([shapes.first, shapes.last[:, -1:]], axis=1)).max(axis=1)
-        return np.asarray(peak * abs(self.morph.change_rad) / self.duration_s**2)
+        return np.asarray(peak * abs(self.morph.change) / self.duration_s**2)
 
     def min_slack(self, points: Array) -> Array:
         """(p,) slack of the tightest limit."""
@@ -204,7 +204,7 @@ class MorphSpace:
         ends = replace(self, duration_s=1e9)
         if not ends.keeps(point[None, :])[0]:
             return np.inf
-        shapes, change = self.shapes(point[None, :]), abs(self.morph.change_rad)
+        shapes, change = self.shapes(point[None, :]), abs(self.morph.change)
         needed = 0.0
         if self.limits.max_rate_rad_s is not None:
             rates = np.concatenate([shapes.turning_rate(), shapes.rate], axis=1)

@@ -86,7 +86,7 @@ class ScheduleOptimisation(MorphCase):
         self.weights, self.search, self.verify = weights or Weights(), search or ScheduleSettings(), verify
         self.flexible = flexible or VerifyingModel()
         self._clock = clock
-        refuse(goal_faults(morph, self.limits))
+        refuse(goal_faults(morph, limits or Limits()))
         with one_blas_thread():
             longest = self.space(morph.duration_s)
             require_schedules(longest)
@@ -281,10 +281,12 @@ class ScheduleOptimisation(MorphCase):
             hint = (
                 f"raise the limit to {rounded_up(minimum):g} or more; the air loads alone require much of it"
             )
+        turns = self.morph.unit == "rad"
+        name, unit = ("max_hinge_torque_nm", "N m") if turns else ("max_drive_force_n", "N")
         return InvalidInput(
-            f"the hinges bear {minimum:.4g} N m at least in a morph of {found.duration_s:g} s, more than "
-            f"max_hinge_torque_nm = {maximum:g}",
-            pointer="/limits/max_hinge_torque_nm",
+            f"the hinges bear {minimum:.4g} {unit} at least in a morph of {found.duration_s:g} s, more than "
+            f"{name} = {maximum:g}",
+            pointer=f"/limits/{name}",
             hint=hint,
         )
 

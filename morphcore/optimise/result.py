@@ -16,6 +16,7 @@ from morphcore.optimise.goals import Found
 from morphcore.optimise.schedule_warnings import schedule_warnings
 from morphcore.optimise.settings import ScheduleSettings
 from morphcore.optimise.state import OptimisationState
+from morphcore.optimise.units import named_in
 from morphcore.shown import Shown, Summary
 from morphcore.simulate.schedule import ConstantRate, Schedule, Spline
 from morphcore.simulate.steady import departure
@@ -105,7 +106,7 @@ class ScheduleResult(Shown):
             {
                 "drive": self.drive,
                 "knot times, s": self.schedule.knot_time_s,
-                "knot angles, rad": self.schedule.knot_angle_rad,
+                f"knots, {self.morph.unit}": self.schedule.knot_angle_rad,
             },
             ("variation, rad^2", *MODELS),
             [[name, *(self.variation(name, model) for model in MODELS)] for name in SCHEDULES],
@@ -145,7 +146,8 @@ class ScheduleResult(Shown):
             ]
         if self.notes:
             document["notes"] = list(self.notes)
-        return document
+        named: Document = named_in(self.morph.unit, document)
+        return named | {"morph": self.morph.model_dump(exclude_none=True)}
 
     def curves(self) -> Document:
         """Time histories for plots and tables: the schedules and the attitude in every model."""
@@ -166,7 +168,7 @@ class ScheduleResult(Shown):
             "time_s": self.times_s.tolist(),
             "drive": self.drive,
             "drives": list(self.drives),
-            "schedules": schedules,
+            "schedules": named_in(self.morph.unit, schedules),
             "flights": flights,
         }
 

@@ -10,7 +10,7 @@ import numpy as np
 from morphcore.optimise.case import MorphCase
 from morphcore.optimise.compared import ComparedFlight
 from morphcore.optimise.state import OptimisationState
-from morphcore.simulate.plan import path_angles, path_controls
+from morphcore.simulate.common_path import path_angles, path_controls
 from morphcore.simulate.schedule import Schedule
 from morphcore.validity import (
     ResultWarning,
@@ -43,7 +43,7 @@ def schedule_warnings(
         found += bending_warnings(
             bench.model.aircraft, bench.bending, "the trim", "/model", case.lattice.shape
         )
-        first = path_angles(case.aircraft, case.drives, np.array([case.morph.initial_rad]))[0]
+        first = path_angles(case.aircraft, case.drives, np.array([case.morph.begin]))[0]
         found += wake_warnings(
             case.aircraft, first, bench.alpha_rad, "/aircraft/surfaces", case.flight.sideslip_rad
         )

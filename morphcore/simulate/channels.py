@@ -18,8 +18,9 @@ B : body axes, forward, right, down, with the origin at the reference point. N :
   lift bends up. ``tip_left_z``, ``tip_right_z`` : of the first hinged surface of a side.
 - ``tip_twist`` : the torsion of the rotation Rx(flap) Ry(torsion) Rz(edgewise) from the axes of a tip to
   those of its root, nose up.
-- ``hinge_torque`` : the total torque of a drive's motors, along its positive coordinate. At a corner of a
-  schedule's rate the hinge's acceleration, and with it torque and load factor, is that of the morph.
+- ``hinge_torque`` : the total torque of a drive's motors, along its positive coordinate; of a drive that
+  slides it is ``drive_force``. At a corner of a schedule's rate the hinge's acceleration, and with it torque
+  and load factor, is that of the morph.
 - ``root_shear``, ``root_bending``, ``root_torsion`` : what the loads outboard of the root of a surface's
   elastic axis, outside its hinges, add up to: air, apparent mass, weight and inertia. In the axes of the
   root; positive upward (-z), bending the tip up, and nose up, on both sides.
@@ -202,13 +203,23 @@ def _tip_twist(record: FlightRecord, aircraft: Aircraft, _flight: Flight) -> Map
     return _per_surface(aircraft, record.tips_twist)
 
 
-def _hinge_torque(record: FlightRecord, aircraft: Aircraft, _flight: Flight) -> Mapping[str, Array]:
+def _of_motors(record: FlightRecord, aircraft: Aircraft, *, sliding: bool) -> Mapping[str, Array]:
+    """Torque, N m, or force, N, (k,) of the motors of each drive that turns, or slides."""
     assert record.loads is not None  # noqa: S101 - `needs` says so
     assert record.loads.hinge_torque is not None  # noqa: S101
     torques: dict[str, Array] = {}
     for column, hinge in zip(record.loads.hinge_torque.T, aircraft.hinges, strict=True):
-        torques[hinge.drive] = torques[hinge.drive] + column if hinge.drive in torques else column
+        if hinge.prismatic == sliding:
+            torques[hinge.drive] = torques[hinge.drive] + column if hinge.drive in torques else column
     return torques
+
+
+def _hinge_torque(record: FlightRecord, aircraft: Aircraft, _flight: Flight) -> Mapping[str, Array]:
+    return _of_motors(record, aircraft, sliding=False)
+
+
+def _drive_force(record: FlightRecord, aircraft: Aircraft, _flight: Flight) -> Mapping[str, Array]:
+    return _of_motors(record, aircraft, sliding=True)
 
 
 def _surfaces(record: FlightRecord) -> SurfaceLoads:
@@ -282,6 +293,7 @@ CHANNELS: list[Channel] = [
     Channel("tip_z", _tip_z),
     Channel("tip_twist", _tip_twist, TWIST),
     Channel("hinge_torque", _hinge_torque, SURFACES),
+    Channel("drive_force", _drive_force, SURFACES),
     Channel("root_shear", _at_root(5, 1.0), SURFACES),
     Channel("root_bending", _at_root(0, 1.0, by_side=True), SURFACES),
     Channel("root_torsion", _at_root(1, -1.0), SURFACES),

@@ -10,7 +10,7 @@ iteration.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from morphcore.multibody.beam import (
 )
 from morphcore.multibody.hinges import hinge_screws, relative_motion
 from morphcore.multibody.kernels.beam import apparent_forces
+from morphcore.multibody.kernels.helix import helix_series
 from morphcore.simulate.control_motion import control_angles, deflections
 from morphcore.simulate.kernels.flexible_step import (
     FLOWN,
@@ -151,7 +152,13 @@ class FlexibleFlight:
 
     def __init__(self, model: FlexibleModel) -> None:
         flight = model.flight
-        self.model = model
+        # a lattice that slides is written to, so it is the flight's own
+        whole = model
+        begin = np.array([hinge.angle_rad for hinge in model.aircraft.hinges])
+        model = model.at(begin)
+        if model.compliances.size:
+            model = replace(model, beams=replace(model.beams, stiffness=model.held(begin)))
+        self._whole, self.model = whole, model
         self.thrust: Array = np.zeros(6)
         self.work = BeamWorkspace(model.beams)
         self.gravity_N: Array = np.array([0.0, 0.0, flight.gravity_m_s2])
@@ -165,6 +172,23 @@ class FlexibleFlight:
         self.sections = Sections(model.beams, model.element, model.fraction)
         self._v: Array = np.zeros((3, 6))
         self._m: Array = np.zeros((2, 6, 6))
+
+    @property
+    def slides(self) -> bool:
+        """Whether the lattice slides along surfaces that telescope."""
+        return any(surface.mouth_m is not None for surface in self.model.aircraft.surfaces)
+
+    def slide(self, angles: Array) -> Array:
+        """Seat the lattice as at angles (h,) of all hinges; return its times of lag (2, r), s."""
+        if not self.slides:
+            return self.model.riders.lag_time
+        seated = self.model.at(angles)
+        self.model.element[:], self.model.fraction[:] = seated.element, seated.fraction
+        self.sections.series[:] = helix_series(seated.fraction)
+        if self.model.compliances.size:
+            self.model.beams.stiffness[:] = self._whole.held(angles)
+        self.lattice.reseat(seated.lattice.table, seated.riders, seated.lattice.settings.core)
+        return seated.riders.lag_time
 
     def follow(self, poses: NodePoses, V: Array, A: Array, path: HingePath, row: int) -> None:
         """Put the root nodes where fuselage and hinges say, in place."""
@@ -326,7 +350,7 @@ class FlexibleRun:
     ) -> None:
         model, rule = flight.model, Stepper(grid.step_s)
         self.grid, self.row = grid, 0
-        self._flight = flight
+        self._flight, self._angles = flight, path.angle
         self._structure = flight.structure_arrays()
         self._path = Path(
             R_BW=path.R_BW,
@@ -377,9 +401,14 @@ class FlexibleRun:
         """
         inverted = -1
         while self.row < row:
+            end = row
+            if self._flight.slides:
+                end = self.row + 1
+                seated = Stepper(self.grid.step_s).coefficients(self._flight.slide(self._angles[end]))
+                self._rule.decay[:], self._rule.mean[:] = seated.decay, seated.mean
             self.row, status = fly_steps(
                 self._structure, self._flight.lattice.parts, self._flight.lattice.at, self._path, self._rule,
-                self._state, self._trial, self._scratch, self.records, self.row, row,
+                self._state, self._trial, self._scratch, self.records, self.row, end,
                 self._formed == self.row,
             )  # fmt: skip
             if status == MATRIX_WANTED:
@@ -436,6 +465,7 @@ def set_in_motion(
         wing = slice(root, tip + 1)
         V[wing] = carried(poses, root, V[root], wing)
     circulation = state.circulation
+    flight.slide(path.angle[0])
     flight.lattice.deflect(path.deflection[0])
     for iteration in range(MAX_ITERATIONS):
         flight.follow(poses, V, A, path, 0)

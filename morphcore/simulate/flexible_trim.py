@@ -61,6 +61,7 @@ class _Balance:
         first = np.zeros((model.beams.nodes, 6))
         self.unbent = NodePoses(np.tile(np.eye(3), (model.beams.nodes, 1, 1)), model.rest_W.copy())
         flight.follow(self.unbent, first, first.copy(), path, 0)
+        flight.slide(path.angle[0])
         flight.lattice.deflect(path.deflection[0])
         self.chains = StrainPoses(model.beams, model.roots, model.tips)
         # without stiffness the nodes' forces are those of inertia and weight alone: the strains' own do not

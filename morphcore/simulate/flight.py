@@ -55,6 +55,7 @@ from morphcore.validity import (
 )
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.environment import Environment
+from morphdata.faults import refuse
 from morphdata.flight import Flight as FlightDocument
 from morphdata.lattice import DEFAULT_LATTICE, Lattice, LatticeShape
 from morphdata.points import Point
@@ -62,6 +63,7 @@ from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.csv_table import write_table
 from morphdata.samplefiles.flight import LONGEST_FLIGHT_S, MAX_ROWS, MIN_ROWS
 from morphdata.simulate import DEFAULT_ELEMENTS, OUTPUT_STEP_S
+from morphdata.telescopes import unsupported_faults
 
 Array = NDArray[np.float64]
 ModelChoice = Literal["rigid", "flexible"] | ParameterBatch
@@ -256,6 +258,14 @@ def flight_steps(  # noqa: PLR0913 - as above
     longest_s = flyer.step_s if step_s is None else step_s
     times = _output_times(schedules, duration_s, output_step_s, longest_s)
     wanted = requested_outputs(aircraft, flight, times, channels, points, shape_times_s)
+    refuse(
+        unsupported_faults(
+            aircraft.telescoping,
+            moving_air=environment is not None and not environment.still,
+            channels=channels or (),
+            flexible=model == "flexible",
+        )
+    )
     grid = time_grid(times, longest_s)
     followed = followed_schedules(aircraft, schedules)
     require_ranges(aircraft, followed, grid.times_s, "/schedules")
@@ -354,12 +364,17 @@ def _start_tips(aircraft: Aircraft, record: FlightRecord) -> dict[str, float]:
 def write_trajectory_csv(trajectory: Trajectory, path: str | Path) -> None:
     """Write a trajectory with the columns of the example flights, SI units and radians.
 
+    Columns of drives that slide name their unit, ``span_left_m``.
+
     Cells are empty where a measured channel has a gap. `load_trajectory` reads it back.
     """
     measured = trajectory.channels
     columns = {
         "t": trajectory.time_s,
-        **{name: trajectory.drives[name] for name in trajectory.drive_order},
+        **{
+            trajectory.field_of(name) if trajectory.units.get(name) == "m" else name: trajectory.drives[name]
+            for name in trajectory.drive_order
+        },
         "phi": trajectory.phi,
         "theta": trajectory.theta,
         "psi": trajectory.psi,

@@ -15,6 +15,7 @@ from morphcore.simulate.schedule import Hold, Schedule, Tabulated, scheduled
 from morphcore.simulate.trajectory import Trajectory
 from morphdata import schedules as documents
 from morphdata.drive_keys import resolved, shown_names, unmeasured_sides
+from morphdata.drives import wrong_unit
 from morphdata.faults import Fault, refuse
 from morphdata.samples import columns_of_aircraft, no_drive
 
@@ -48,6 +49,10 @@ def followed_schedules(aircraft: Aircraft, schedules: Schedules) -> Followed:
     if isinstance(schedules, documents.Schedules):
         moved = {key: scheduled(schedule) for key, schedule in schedules.given.items()}
         keys = schedules.keys_by_drive(aircraft.drives)
+        for name, key in keys.items():
+            unit, given = aircraft.drives[name].unit, schedules.given[key]
+            if given.unit != unit:
+                refuse([documents.unit_fault(name, unit, given, f"/schedules/{key}")])
         return {name: (key, moved[key]) for name, key in keys.items()}
     if not isinstance(schedules, Mapping):
         raise InvalidInput(
@@ -82,11 +87,19 @@ def followed_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -
         if drives and not flight.drives:
             faults = [no_drive(drives)]
     faults = faults or list(unmeasured_sides(keys, drives))
+    refuse(_at_field(fault, flight).under(pointer) for fault in faults)
     refuse(
-        replace(fault, pointer=f"{fault.pointer}_rad" if fault.pointer else "").under(pointer)
-        for fault in faults
+        wrong_unit(drives[name], flight.units[key], f"/{flight.field_of(key)}").under(pointer)
+        for name, key in keys.items()
+        if flight.units.get(key, drives[name].unit) != drives[name].unit
     )
     return {name: (key, Tabulated(flight.time_s, flight.drives[key])) for name, key in keys.items()}
+
+
+def _at_field(fault: Fault, flight: Trajectory) -> Fault:
+    """A fault at ``/key`` at the field of that key."""
+    key = fault.pointer.removeprefix("/")
+    return replace(fault, pointer=f"/{flight.field_of(key)}") if key else fault
 
 
 def moved_flight(aircraft: Aircraft, flight: Trajectory, pointer: str = "") -> Trajectory:
@@ -127,10 +140,11 @@ def require_ranges(aircraft: Aircraft, followed: Followed, times_s: np.ndarray, 
             angle = schedule.motion(times_s).angle
             outside = hinge.beyond_range(angle)
             if outside.size:
-                row, kind = outside[0], part_name(hinge)
+                row, kind, unit = outside[0], part_name(hinge), hinge.unit
+                values = "angles" if unit == "rad" else "extensions"
                 raise InvalidInput(
-                    f"the {kind} {hinge.drive} of {surface.name} is driven to {angle[row]:.4g} rad at "
-                    f"t = {times_s[row]:.3f} s, beyond its range {hinge.min_rad:g}..{hinge.max_rad:g} rad",
+                    f"the {kind} {hinge.drive} of {surface.name} is driven to {angle[row]:.4g} {unit} at "
+                    f"t = {times_s[row]:.3f} s, beyond its range {hinge.min_rad:g}..{hinge.max_rad:g} {unit}",
                     pointer=f"{pointer}/{key}",
-                    hint=f"lower the angles, or widen the {kind}'s range; a spline can go beyond its knots",
+                    hint=f"lower the {values}, or widen the {kind}'s range; a spline can go beyond its knots",
                 )

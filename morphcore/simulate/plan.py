@@ -13,10 +13,7 @@ from morphcore.aero.bent_shape import BentShape
 from morphcore.aero.environment import MovingAir
 from morphcore.aero.gust_lag import KUESSNER
 from morphcore.aero.operator import LatticeOperator, lattice_operator
-from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft
-from morphcore.geometry.control import Control
-from morphcore.geometry.hinge import Hinge
 from morphcore.models.equivalent import ChainModel
 from morphcore.multibody.kernels.hinge import H_TWIST
 from morphcore.shown import Shown
@@ -32,11 +29,9 @@ from morphcore.simulate.schedule import Hold, Schedule
 from morphcore.simulate.surface_motion import surface_accelerations, surface_rows
 from morphcore.simulate.time_grid import STEP_S, TimeGrid
 from morphcore.simulate.trim import StartMode
-from morphcore.simulate.trim_controls import trim_controls
 from morphcore.simulate.wake import (
     NominalStart,
     nominal_start,
-    refuse_moved_trim,
     trimmed_schedules,
     wake_direction,
 )
@@ -47,7 +42,6 @@ NODE_SPACING_RAD = (
     0.025  # of the lattice table along the morph; interpolated by cubics (see tests/simulate/test_plan.py)
 )
 ALIKE_RAD = 1e-9  # hinges of both sides that differ by less move alike: the flight rolls by less than that
-RANGE_SLACK = 1e-9  # of a path's width: round-off of a schedule that ends at the path's end
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,7 +94,7 @@ class FlightPlan(Shown):
 
     def flown(self, model: ChainModel) -> ChainModel:
         """The model that flies this plan: the given one, or one half of it."""
-        return _flown(model, halved=self.halved)
+        return half_if(model, halved=self.halved)
 
     def coarser(self, grid: TimeGrid) -> FlightPlan:
         """The same flight on a coarser grid, whose ``halved`` is this plan's grid; nothing is recomputed.
@@ -205,18 +199,18 @@ def flight_plan(
         begin = start_at(model, np.array([each.motion(times[:1]).angle[0] for each in schedules]), start)
         schedules = trimmed_schedules(model, schedules, times, begin)
         wake_alpha, shape = begin.alpha, begin.shape
-    motion = _motion(model.aircraft, schedules, times)
+    motion = motion_of(model.aircraft, schedules, times)
     if may_halve and air is None:
-        model, motion, shape = _halved(model, motion, shape)
+        model, motion, shape = halved_motion(model, motion, shape)
     gusts = None
     if air is not None:
         gusts = GustTable(air, model.lattice, wake_alpha, KUESSNER, times, motion.angles)
     table = _operator_table(model, motion, node_spacing_rad, wake_alpha, shape, 0.5 * grid.step_s)
-    return _plan(model, grid, motion, table, shape, gusts)
+    return assembled_plan(model, grid, motion, table, shape, gusts)
 
 
 @dataclass(frozen=True)
-class _Motion:
+class Motion:
     """Angles, rates and accelerations (k, h) of all hinges, rad, rad/s, rad/s^2.
 
     deflected : (k, c) deflections of all controls, trailing edge down, rad.
@@ -227,21 +221,22 @@ class _Motion:
     accelerations: Array
     deflected: Array
 
-    def columns(self, chosen: Sequence[int], controls: Sequence[int]) -> _Motion:
+    def columns(self, chosen: Sequence[int], controls: Sequence[int]) -> Motion:
         """The motion of some of the hinges and controls."""
         kept = list(chosen)
         own = self.angles[:, kept], self.rates[:, kept], self.accelerations[:, kept]
-        return _Motion(*own, self.deflected[:, list(controls)])
+        return Motion(*own, self.deflected[:, list(controls)])
 
 
-def _motion(aircraft: Aircraft, schedules: Sequence[Schedule], times: Array) -> _Motion:
+def motion_of(aircraft: Aircraft, schedules: Sequence[Schedule], times: Array) -> Motion:
+    """Angles, rates and accelerations of all hinges and controls at some times (k,)."""
     of_hinges = np.zeros((3, times.size, len(aircraft.hinges)))
     for column, schedule in enumerate(schedules[: len(aircraft.hinges)]):
         motion = schedule.motion(times)
         of_hinges[:, :, column] = motion.angle, motion.rate, motion.acceleration
     angles, rates, accelerations = of_hinges
     deflected = deflections(aircraft, control_angles(aircraft, schedules, times))
-    return _Motion(angles, rates, accelerations, deflected)
+    return Motion(angles, rates, accelerations, deflected)
 
 
 def start_at(model: ChainModel, angles: Array, start: StartMode) -> NominalStart:
@@ -256,162 +251,30 @@ def _instant(model: ChainModel, angles: Array, wake_alpha: float, shape: BentSha
     return flight_plan(model, held, grid, may_halve=True, wake_alpha=wake_alpha, shape=shape)
 
 
-@dataclass(frozen=True)
-class CommonPath:
-    """Some drives of an aircraft at a common angle: the lattice over a range of it, for schedules within it.
+def path_lengths(aircraft: Aircraft) -> Array:
+    """What (h,) a unit of each hinge counts in the path along which lattices are tabulated: 1 for an angle.
 
-    Plans of different schedules share its nodes, so that a further schedule needs no new lattice; models that
-    differ only in their links may share them too.
-
-    low_rad, high_rad : the range. drives : names of those that move together; None: all. Others hold their
-    hinges' own angles. matrices, strips : as in ``OperatorTable``, at equal spacing over the range. halved :
-    as in ``FlightPlan``. begin : the start for which the lattice was tabulated. controls : as in
-    ``ControlTable``; None without control surfaces. shape : of the surfaces, or of the half that flies.
+    Extensions count in lengths of their surface: by as much as an angle of the same size moves its tip.
     """
-
-    low_rad: float
-    high_rad: float
-    drives: tuple[str, ...] | None
-    matrices: Array
-    strips: Array
-    halved: bool
-    begin: NominalStart
-    controls: Array | None = None
-    shape: BentShape | None = None
-
-    def flown(self, model: ChainModel) -> ChainModel:
-        """The model that flies the plans: the given one, or one half of it."""
-        return _flown(model, halved=self.halved)
-
-    def moves(self, hinge: Hinge) -> bool:
-        """Whether a hinge moves."""
-        return _moves(hinge, self.drives)
-
-    def plan(self, model: ChainModel, schedule: Schedule, grid: TimeGrid) -> FlightPlan:
-        """Prepare a flight in which the hinges of the path's drives follow one schedule.
-
-        Raises
-        ------
-        InvalidInput : the schedule leaves the range.
-        """
-        motion = schedule.motion(grid.halves_s)
-        width = self.high_rad - self.low_rad
-        share = (motion.angle - self.low_rad) / width
-        if share.min() < -RANGE_SLACK or share.max() > 1.0 + RANGE_SLACK:
-            raise InvalidInput(
-                f"the schedule runs from {motion.angle.min():g} to {motion.angle.max():g} rad",
-                pointer="/schedule",
-                hint=f"this path's range is {self.low_rad:g}..{self.high_rad:g} rad",
-            )
-        position = share * (self.matrices.shape[0] - 1)
-        flown = self.flown(model)
-        schedules = path_schedules(flown.aircraft, self.drives, schedule)
-        schedules = trimmed_schedules(flown, schedules, grid.halves_s, self.begin)
-        moved = _motion(flown.aircraft, schedules, grid.halves_s)
-        controls = _control_table(flown, self.controls, moved, 0.5 * grid.step_s)
-        table = OperatorTable(self.matrices, self.strips, position, controls)
-        return _plan(flown, grid, moved, table, self.shape)
-
-
-def common_path(
-    model: ChainModel,
-    low_rad: float,
-    high_rad: float,
-    node_spacing_rad: float = NODE_SPACING_RAD,
-    *,
-    drives: Sequence[str] | None = None,
-    may_halve: bool = False,
-    start: StartMode = "trim",
-    wake_alpha: float | None = None,
-    initial_rad: float | None = None,
-) -> CommonPath:
-    """Tabulate the lattice for some drives together between two angles, the others at their held angles.
-
-    drives : names; None: all. may_halve, start, wake_alpha : as in ``flight_plan``. initial_rad : the angle
-    at which flights begin; None: ``low_rad``.
-
-    Raises
-    ------
-    InvalidInput : a trim drive is among the path's drives.
-    """
-    chosen = None if drives is None else tuple(drives)
-    path = np.linspace(low_rad, high_rad, _nodes(high_rad - low_rad, node_spacing_rad))
-    angles = path_angles(model.aircraft, chosen, path)
-    still = np.zeros_like(angles)
-    deflected = deflections(model.aircraft, path_controls(model.aircraft, chosen, path))
-    motion = _Motion(angles, still, still, deflected)
-    begin = NominalStart(wake_alpha) if wake_alpha is not None else None
-    if begin is None:
-        refuse_moved_trim(model, [_moves(part, chosen) for part in model.aircraft.moved_parts], start)
-        at = np.array([low_rad if initial_rad is None else initial_rad])
-        first = np.concatenate(
-            [path_angles(model.aircraft, chosen, at)[0], path_controls(model.aircraft, chosen, at)[0]]
-        )
-        begin = start_at(model, first, start)
-        if begin.drives_rad:
-            held = trim_controls(model.aircraft, model.flight)
-            for control, angle in zip(held, begin.drives_rad, strict=True):
-                angles[:, control.columns[control.columns < angles.shape[1]]] = angle
-    shape = begin.shape
-    if may_halve:
-        model, motion, shape = _halved(model, motion, shape)
-    mach, wake = model.flight.mach or 0.0, wake_direction(begin.alpha, model.flight.sideslip_rad)
-    # a path of controls alone has one lattice
-    rows = motion.angles if np.ptp(motion.angles, axis=0).any() else motion.angles[:1]
-    operators = [
-        lattice_operator(model.lattice, tuple(row), mach=mach, wake_direction_B=wake, shape=shape)
-        for row in rows
-    ]
-    return CommonPath(
-        low_rad,
-        high_rad,
-        chosen,
-        np.stack([item.matrix for item in operators]),
-        np.stack([item.strips for item in operators]),
-        bool(model.lattice.images),
-        begin,
-        _stacked_controls(operators),
-        shape,
+    return np.array(
+        [
+            1.0 / surface.length_m if hinge.prismatic else 1.0
+            for surface in aircraft.surfaces
+            for hinge in surface.hinges
+        ]
     )
 
 
-def path_angles(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Array) -> Array:
-    """Angles (k, h) of all hinges when some drives (None: all) are at angles (k,), rad, and others hold."""
-    angles = np.empty((angle_rad.size, len(aircraft.hinges)))
-    for column, hinge in enumerate(aircraft.hinges):
-        angles[:, column] = angle_rad if _moves(hinge, drives) else hinge.angle_rad
-    return angles
-
-
-def path_controls(aircraft: Aircraft, drives: Sequence[str] | None, angle_rad: Array) -> Array:
-    """Angles (k, c) of all controls' drives, like `path_angles`; None moves hinges alone."""
-    angles = np.empty((angle_rad.size, len(aircraft.controls)))
-    for column, control in enumerate(aircraft.controls):
-        angles[:, column] = angle_rad if _moves(control, drives) else control.angle_rad
-    return angles
-
-
-def path_schedules(aircraft: Aircraft, drives: Sequence[str] | None, schedule: Schedule) -> list[Schedule]:
-    """A schedule for each hinge, then for each control.
-
-    The given one for the moving drives (None: those of all hinges), a held angle for the others.
-    """
-    return [schedule if _moves(part, drives) else Hold(part.angle_rad) for part in aircraft.moved_parts]
-
-
-def _moves(part: Hinge | Control, drives: Sequence[str] | None) -> bool:
-    return isinstance(part, Hinge) if drives is None else part.drive in drives
-
-
-def _flown(model: ChainModel, *, halved: bool) -> ChainModel:
+def half_if(model: ChainModel, *, halved: bool) -> ChainModel:
+    """Return one half of a model where the plan is for one."""
     half = model.half if halved else None
     return model if half is None else half
 
 
-def _plan(
+def assembled_plan(
     model: ChainModel,
     grid: TimeGrid,
-    motion: _Motion,
+    motion: Motion,
     table: OperatorTable,
     shape: BentShape | None,
     gusts: GustTable | None = None,
@@ -443,9 +306,9 @@ def _plan(
     )
 
 
-def _halved(
-    model: ChainModel, motion: _Motion, shape: BentShape | None
-) -> tuple[ChainModel, _Motion, BentShape | None]:
+def halved_motion(
+    model: ChainModel, motion: Motion, shape: BentShape | None
+) -> tuple[ChainModel, Motion, BentShape | None]:
     """One half of an aircraft whose halves move alike, its motion and shape; the whole if they do not."""
     mirror, half = model.mirror, model.half
     if mirror is None or half is None:
@@ -458,19 +321,21 @@ def _halved(
     return half, motion.columns(mirror.own_hinges, mirror.own_controls), own_shape
 
 
-def _nodes(length_rad: float, spacing_rad: float) -> int:
+def node_count(length_rad: float, spacing_rad: float) -> int:
     """Number of nodes of a lattice table over a path: a cubic needs four."""
     return max(4, int(np.ceil(length_rad / spacing_rad)) + 1)
 
 
-def _stacked_controls(operators: Sequence[LatticeOperator]) -> Array | None:
+def stacked_controls(operators: Sequence[LatticeOperator]) -> Array | None:
+    """Columns of the controls of several operators; None without controls."""
     controls = np.stack([item.controls for item in operators])
     return controls if controls.shape[2] else None
 
 
-def _control_table(
-    model: ChainModel, controls: Array | None, motion: _Motion, spacing_s: float
+def control_table(
+    model: ChainModel, controls: Array | None, motion: Motion, spacing_s: float
 ) -> ControlTable | None:
+    """Responses to the controls along a flight; None without controls."""
     if controls is None:
         return None
     lagged = lagged_deflections(model.aircraft, model.flight.airspeed_m_s, motion.deflected, spacing_s)
@@ -480,7 +345,7 @@ def _control_table(
 
 def _operator_table(
     model: ChainModel,
-    motion: _Motion,
+    motion: Motion,
     spacing: float,
     wake_alpha: float,
     shape: BentShape | None,
@@ -488,7 +353,7 @@ def _operator_table(
 ) -> OperatorTable:
     mach, angles = model.flight.mach or 0.0, motion.angles
     wake = wake_direction(wake_alpha, model.flight.sideslip_rad)
-    moved = np.abs(np.diff(angles, axis=0))
+    moved = np.abs(np.diff(angles, axis=0)) * path_lengths(model.aircraft)
     # a surface turns by no more than all its hinges together
     turned = np.stack([moved[:, own].sum(axis=1) for own in model.aircraft.hinge_columns])
     travelled = np.concatenate([[0.0], np.cumsum(turned.max(axis=0))])
@@ -500,7 +365,7 @@ def _operator_table(
         operators = [operator(angles[0])]
         position = np.zeros(travelled.size)
     else:
-        count = _nodes(travelled[-1], spacing)
+        count = node_count(travelled[-1], spacing)
         nodes = np.linspace(0.0, travelled[-1], count)
         # strictly rising abscissae for the inverse: while a shape is held, many times have the same path
         # length
@@ -512,5 +377,5 @@ def _operator_table(
         np.stack([item.matrix for item in operators]),
         np.stack([item.strips for item in operators]),
         position,
-        _control_table(model, _stacked_controls(operators), motion, spacing_s),
+        control_table(model, stacked_controls(operators), motion, spacing_s),
     )

@@ -122,6 +122,7 @@ def recorded_trajectory(
 ) -> Trajectory:
     """The trajectory with the angles of all drives and some further columns."""
     drives: dict[str, Array] = {}
+    units = {part.drive: part.unit for part in aircraft.moved_parts}
     for column, part in enumerate(aircraft.moved_parts):  # all hinges of a drive turn together
         drives.setdefault(part.drive, record.angles[:, column].copy())
     phi, theta, psi = record.euler.T.copy()
@@ -134,6 +135,7 @@ def recorded_trajectory(
         psi=psi,
         extra=extra,
         channels=extra,
+        units=units,
     )
     for values in (times, phi, theta, psi, *drives.values()):
         values.setflags(write=False)

@@ -227,7 +227,7 @@ def trajectory_document(trajectory: Trajectory) -> Document:
         "time_s": trajectory.time_s,
         "sweep_left_rad": trajectory.sweep_left,
         "sweep_right_rad": trajectory.sweep_right,
-        **{f"{name}_rad": trajectory.drives[name] for name in trajectory.drive_order},
+        **{trajectory.field_of(name): trajectory.drives[name] for name in trajectory.drive_order},
         **{f"{angle}_rad": getattr(trajectory, angle) for angle in ANGLES},
         **{document_name(name): values for name, values in trajectory.extra.items()},
     }

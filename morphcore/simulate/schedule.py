@@ -1,4 +1,4 @@
-"""Schedules of one hinge: angle, rate and acceleration as functions of time, rad, rad/s, rad/s^2."""
+"""Schedules of one hinge: angle (or extension), rate and acceleration over time, rad (or m) and s."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from morphcore.errors import InvalidInput
 from morphdata import schedules as documents
+from morphdata.history import DEFAULT_RAMP_S
 
 if TYPE_CHECKING:  # imported late: not every flight interpolates
     from scipy.interpolate import Akima1DInterpolator, CubicSpline
@@ -58,7 +59,7 @@ class ConstantRate:
     final_rad: float
     duration_s: float
     start_s: float = 0.0
-    ramp_s: float = documents.DEFAULT_RAMP_S
+    ramp_s: float = DEFAULT_RAMP_S
 
     def __post_init__(self) -> None:
         if self.duration_s <= 0:
@@ -156,17 +157,16 @@ class Tabulated:
 
 def scheduled(document: documents.AnySchedule) -> Schedule:
     """Return the schedule that a document describes."""
-    if isinstance(document, documents.Hold):
-        return Hold(document.angle_rad)
-    if isinstance(document, documents.ConstantRate):
-        return ConstantRate(
-            document.initial_rad, document.final_rad, document.morph_s, document.start_s, document.ramp_s
-        )
-    if isinstance(document, documents.Quadratic):
-        return Quadratic(document.initial_rad, document.final_rad, document.duration_s, document.start_s)
-    if isinstance(document, documents.Spline):
-        return Spline(np.array(document.knot_time_s), np.array(document.knot_angle_rad))
-    return Tabulated(np.array(document.time_s), np.array(document.angle_rad))
+    values = [value for value, _ in document.named]
+    if document.kind == "hold":
+        return Hold(*values)
+    if document.kind == "constant_rate":
+        return ConstantRate(values[0], values[1], document.morph_s, document.start_s, document.ramp_s)
+    if document.kind == "quadratic":
+        return Quadratic(values[0], values[1], document.duration_s, document.start_s)
+    if document.kind == "spline":
+        return Spline(np.array(document.knot_time_s), np.array(values))
+    return Tabulated(np.array(document.time_s), np.array(values))
 
 
 def _held(

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from morphcore.aero.kernels.loads import L_FAST_DECAY, L_SLOW_DECAY
+from morphcore.aero.kernels.loads import L_FAST_DECAY, L_SLOW_DECAY, TELESCOPES
 from morphcore.lanes import lane_type
 from morphcore.models.equivalent import ChainModel, LaneConstants
 from morphcore.models.kernels.layout import LINKS_C
+from morphcore.models.telescope import mouth_forces
 from morphcore.multibody.hinges import hinge_screws
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 from morphcore.simulate.batch import shared_numbers
@@ -47,6 +48,8 @@ class ChainLoads:
 
 def hinge_torques(model: ChainModel, plan: FlightPlan, constants: LaneConstants, states: Array) -> Array:
     """Torque of the hinge motors at every grid time, (steps + 1, h), N m along the positive angles.
+
+    Of a prismatic hinge it is the force of its drive along the extension, N.
 
     Inverse dynamics of the wings with their own accelerations and air loads at that instant; the hinges'
     accelerations are the schedule's (at its ends those of the morph, not of the adjacent rest). Columns are
@@ -102,6 +105,8 @@ def chain_loads(
             scratch, inputs, outputs, rates, out[part], twist_rates[part], roots[part], bodies[part],
             sections[part],
         )  # fmt: skip
+    if model.surfaces[:, TELESCOPES].any():
+        out += mouth_forces(model, constants.rows[0], plan.angles, states)
     air, twist, acceleration = np.split(bodies, 3, axis=2)
     return ChainLoads(out, twist_rates, roots, air, twist, acceleration, sections)
 

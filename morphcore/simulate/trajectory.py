@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from morphcore.errors import InvalidInput
 from morphcore.shown import Shown
-from morphdata.drives import without_side
+from morphdata.drives import field_name, without_side
 from morphdata.measurement import ANGLES
 from morphdata.samplefiles.channel_columns import without_gaps
 from morphdata.samplefiles.declared import declared
@@ -36,8 +36,8 @@ class Trajectory(Shown):
     time_s : ndarray, shape (k,)
         Increasing times, s.
     drives : mapping of str to ndarray, shape (k,)
-        Angle of each moving drive, rad, by its name (``sweep_left``), or by its word if both sides move
-        together (``sweep``).
+        Angle of each moving drive, rad, or extension, m, by its name (``sweep_left``), or by its word if
+        both sides move together (``sweep``).
     phi, theta, psi : ndarray, shape (k,)
         Euler angles from N to B (z-y-x), rad.
     role : {"train", "held_out"}
@@ -54,6 +54,8 @@ class Trajectory(Shown):
     channels : mapping of str to ndarray, shape (k,)
         Measured channels by their columns (``p``, ``nz``, ``tip_z_right_wing``, as in
         ``morphdata.channels``), SI units; NaN where a value is missing.
+    units : mapping of str to {"rad", "m"}
+        Units of those of ``drives`` for which they were stated: m for drives that slide.
     """
 
     name: str
@@ -68,6 +70,7 @@ class Trajectory(Shown):
     of_file: bool = False
     unreadable: Mapping[str, str] = field(default_factory=dict)
     channels: Mapping[str, Array] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, sample: InlineSample) -> Trajectory:
@@ -82,7 +85,12 @@ class Trajectory(Shown):
             role=sample.role,
             weight=sample.weight,
             channels={name: _column(without_gaps(values)) for name, values in sample.channels.items()},
+            units=sample.drive_units,
         )
+
+    def field_of(self, name: str) -> str:
+        """The field of a drive's column in documents: with its unit, rad unless another one was stated."""
+        return field_name(name, self.units.get(name, "rad"))
 
     @property
     def euler(self) -> Array:
@@ -96,18 +104,19 @@ class Trajectory(Shown):
 
     @property
     def sweep_left(self) -> Array:
-        """Angle (k,) of the first drive of the left side, rad; zeros if there is none."""
+        """Angle (k,) of the first drive of the left side that turns, rad; zeros if there is none."""
         return self._side("left")
 
     @property
     def sweep_right(self) -> Array:
-        """Angle (k,) of the first drive of the right side, rad; zeros if there is none."""
+        """Angle (k,) of the first drive of the right side that turns, rad; zeros if there is none."""
         return self._side("right")
 
     def _side(self, side: str) -> Array:
         # a drive's name ends with its side, a word stands for both
-        own = [values for name, values in self.drives.items() if name.endswith(f"_{side}")]
-        words = [values for name, values in self.drives.items() if without_side(name) == name]
+        turning = {name: each for name, each in self.drives.items() if self.units.get(name, "rad") == "rad"}
+        own = [values for name, values in turning.items() if name.endswith(f"_{side}")]
+        words = [values for name, values in turning.items() if without_side(name) == name]
         return next(iter([*own, *words]), np.zeros_like(self.time_s))
 
     @property
@@ -187,6 +196,7 @@ def load_trajectory(
         of_file=True,
         unreadable={name: said_of(fault) for name, fault in read.unreadable.items()},
         channels={name: _column(values) for name, values in read.channels.items()},
+        units=read.units,
     )
 
 
@@ -194,7 +204,7 @@ def require_flight(trajectory: Trajectory, pointer: str) -> None:
     """Raise InvalidInput if a sample violates the rules of `morphdata.samplefiles.flight`."""
     columns = {"t": trajectory.time_s, **{name: getattr(trajectory, name) for name in ANGLES}}
     columns |= trajectory.drives
-    called = {name: INLINE.get(name, f"{name}_rad") for name in columns}
+    called = {name: INLINE.get(name, trajectory.field_of(name)) for name in columns}
     for fault in flight_faults({name: values.tolist() for name, values in columns.items()}, called):
         row = "" if fault.row is None else f"/{fault.row}"
         raise InvalidInput(

@@ -29,6 +29,7 @@ from morphdata.samplefiles.titles import (
     drive_meant,
     known_units,
     missing_columns,
+    slides,
 )
 
 MAX_DRIVES = 64  # 16 surfaces of 4 hinges each
@@ -95,7 +96,8 @@ class FlightColumns:
     values : the wanted ones by name, SI units.
     others : further ones by their own titles, units as they are.
     lines : of a text file the line of each row, from 1; else empty.
-    candidates : further ones that could be drives by the drive's name, rad.
+    candidates : further ones that could be drives by the drive's name, rad or m.
+    units : of candidates whose titles name a unit, "rad" or "m".
     unreadable : what is wrong with columns that could be drives or are channels as well, by the name.
     channels : further ones of channels by the channel's column, SI units; NaN where a value is missing.
     """
@@ -106,6 +108,7 @@ class FlightColumns:
     candidates: dict[str, array[float]] = field(default_factory=dict)
     unreadable: dict[str, FileFault] = field(default_factory=dict)
     channels: dict[str, array[float]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
 
     @property
     def drives(self) -> dict[str, array[float]]:
@@ -237,6 +240,11 @@ def gathered(
         candidates,
         unreadable | broken,
         channels,
+        {
+            name: "m" if slides(title) else "rad"
+            for name, (title, factor) in meant.items()
+            if name in candidates and factor is not None
+        },
     )
     if not found.drives and wanted.optional:
         sided = (fault for name, fault in unreadable.items() if name.endswith(("_left", "_right")))

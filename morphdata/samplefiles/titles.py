@@ -9,7 +9,14 @@ from morphdata.channels import is_channel
 from morphdata.samplefiles.channel_titles import channel_meant
 from morphdata.samplefiles.fault import TITLES, FileFault, shown
 from morphdata.samplefiles.frames import EULER, QUATERNION
-from morphdata.samplefiles.units import ANGLE_UNITS, TIME_UNITS, UNIT_IN_BRACKETS, plain, unit_pattern
+from morphdata.samplefiles.units import (
+    ANGLE_UNITS,
+    LENGTH_UNITS,
+    TIME_UNITS,
+    UNIT_IN_BRACKETS,
+    plain,
+    unit_pattern,
+)
 
 FLIGHT = ("t", "sweep_left", "sweep_right", "phi", "theta", "psi")
 SWEEPS = ("sweep_left", "sweep_right")
@@ -20,6 +27,8 @@ NUMBERED = re.compile(r"q_?\[?([0-3])\]?")  # q0, q_0, q[0]: of a quaternion in 
 SYNONYMS = {"time": "t"}
 # the unit last, after a mark or in brackets: theta_deg, theta [deg], theta/deg, theta, deg, theta in deg
 UNIT = unit_pattern((*TIME_UNITS, *ANGLE_UNITS))
+# of a drive that slides: words end in m too, so a mark stands before the unit
+LENGTH = unit_pattern(LENGTH_UNITS, marked=True)
 
 
 def unit_factor(name: str, unit: str) -> float | None:
@@ -50,15 +59,18 @@ def meaning(title: str, names: Sequence[str]) -> tuple[str, float | None] | None
 
 
 def drive_meant(title: str) -> tuple[str, float | None] | None:
-    """The drive that a title could mean and its factor to rad, None where it names no unit.
+    """The drive that a title could mean and its factor to rad or m, None where it names no unit.
 
-    >>> drive_meant("Fold_left [deg]"), drive_meant("cant"), drive_meant("p_rad_s")
-    (('fold_left', 0.017453292519943295), ('cant', None), None)
+    >>> drive_meant("Fold_left [deg]"), drive_meant("cant"), drive_meant("span_mm"), drive_meant("p_rad_s")
+    (('fold_left', 0.017453292519943295), ('cant', None), ('span', 0.001), None)
     """
     if channel_meant(title) is not None:
         return None
     whole = plain(title)
     factor = None
+    match = LENGTH.fullmatch(whole)
+    if match is not None and _could_be_a_drive(match["name"].rstrip("_")):
+        return match["name"].rstrip("_"), LENGTH_UNITS[match["unit"]]
     match = UNIT.fullmatch(whole)
     if match is not None:
         whole = match["name"].rstrip("_")
@@ -66,6 +78,11 @@ def drive_meant(title: str) -> tuple[str, float | None] | None:
         if factor is None:
             return None
     return (whole, factor) if _could_be_a_drive(whole) else None
+
+
+def slides(title: str) -> bool:
+    """Whether a title that could mean a drive says that it slides: its unit is one of length."""
+    return drive_meant(title) is not None and LENGTH.fullmatch(plain(title)) is not None
 
 
 def drive_in_brackets(title: str) -> str | None:

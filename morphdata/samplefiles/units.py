@@ -54,6 +54,10 @@ ACCELERATION_UNITS = {  # -> m/s^2
     "g": STANDARD_GRAVITY_M_S2,
     "mg": 1e-3 * STANDARD_GRAVITY_M_S2,
 }
+FORCE_UNITS = {  # -> N
+    **dict.fromkeys(("n", "newton", "newtons"), 1.0),
+    "kn": 1e3,
+}
 TORQUE_UNITS = {  # -> N m
     **dict.fromkeys(("nm", "n_m", "n*m", "n.m", "n·m"), 1.0),
     **dict.fromkeys(("knm", "kn_m", "kn*m", "kn.m"), 1e3),
@@ -66,12 +70,15 @@ LINE_LOAD_UNITS = {  # -> N/m
 UNIT_IN_BRACKETS = re.compile(r"(?P<name>.+?)_*[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]")
 
 
-def unit_pattern(units: Iterable[str]) -> re.Pattern[str]:
+def unit_pattern(units: Iterable[str], *, marked: bool = False) -> re.Pattern[str]:
     """A title with one of some units last, after a mark or in brackets.
 
-    All of ``theta_deg``, ``theta [deg]``, ``theta/deg``, ``theta, deg`` and ``theta in deg`` match.
+    All of ``theta_deg``, ``theta [deg]``, ``theta/deg``, ``theta, deg`` and ``theta in deg`` match; so does
+    ``thetadeg``, unless the unit must be ``marked``.
     """
     spelt = "|".join(map(re.escape, sorted(units, key=len, reverse=True)))
+    if marked:
+        return re.compile(rf"(?P<name>.+?)[_./,:;\[({{<-]+(?:in_)?_*(?P<unit>{spelt})_*[\])}}>]?")
     return re.compile(rf"(?P<name>.+?)(?:[_./,:;-]+in_|[_./,:;-]*)[\[({{<]?_*(?P<unit>{spelt})_*[\])}}>]?")
 
 

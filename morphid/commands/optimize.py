@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from morphdata.drives import SWEEPS, label
+from morphdata.extensions import knot_values
 from morphid.commands import options
 from morphid.commands.operation import Particulars, Values
 from morphid.files import writing
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 MODELS = ("rigid", "equivalent", "flexible")
 SCHEDULES = {"constant": "constant rate", "rigid_optimum": "rigid optimum", "optimum": "optimum"}
 REACHED = {"max_rate_rad_s": "rad/s", "max_accel_rad_s2": "rad/s²", "max_hinge_torque_nm": "N m"}
+SLIDING = {"max_rate_m_s": "m/s", "max_accel_m_s2": "m/s²", "max_drive_force_n": "N"}
 ROW_STEP_S = 0.01  # s between rows of the written schedule, as in the example flights
 
 
@@ -42,8 +44,10 @@ def _write_schedule(result: Mapping[str, Any], path: Path) -> None:
     from morphid.running import wrote
 
     found = result["schedule"]
-    spline = Spline(np.array(found["knot_time_s"]), np.array(found["knot_sweep_rad"]))
+    spline = Spline(np.array(found["knot_time_s"]), np.array(knot_values(found)))
     drives = sorted(result.get("drives", SWEEPS))  # the only one in results of earlier versions
+    if "knot_extension_m" in found:
+        drives = [f"{name}_m" for name in drives]
     end_s = found["knot_time_s"][-1] + result["morph"]["settle_s"]
     times = ROW_STEP_S * np.arange(int(np.ceil(end_s / ROW_STEP_S - 1e-9)) + 1, dtype=np.float64)
     with writing(path):
@@ -71,13 +75,15 @@ def variation_table(result: Mapping[str, Any]) -> Table:
     if reduction is not None:
         caption = f"optimum: {reduction:.1f} % below constant rate ({model} model)"
     title = "Attitude variation in rad²; largest rate, acceleration, torque"
-    table = new_table("schedule", *MODELS, *REACHED.values(), title=title, caption=caption)
+    slides = result.get("morph", {}).get("final_m") is not None
+    limits = SLIDING if slides else REACHED
+    if slides:
+        title = title.replace("torque", "force")
+    table = new_table("schedule", *MODELS, *limits.values(), title=title, caption=caption)
     for name, title in SCHEDULES.items():
         flown = result["variation"].get(name) or {}
         reached = (result.get("reached") or {}).get(name) or {}
-        table.add_row(
-            title, *(short(flown.get(m)) for m in MODELS), *(short(reached.get(r)) for r in REACHED)
-        )
+        table.add_row(title, *(short(flown.get(m)) for m in MODELS), *(short(reached.get(r)) for r in limits))
     return table
 
 
@@ -94,9 +100,10 @@ def front_table(front: Sequence[Mapping[str, Any]]) -> Table:
 def knot_table(schedule: Mapping[str, Any]) -> Table:
     """Show the knots of the schedule's clamped cubic spline."""
     drive = label(schedule.get("drive") or "sweep")
-    table = new_table("time, s", f"{drive}, rad", title="Knots of the spline", left=0)
-    for time_s, angle_rad in zip(schedule["knot_time_s"], schedule["knot_sweep_rad"], strict=True):
-        table.add_row(f"{time_s:.4f}", f"{angle_rad:.4f}")
+    unit = "m" if "knot_extension_m" in schedule else "rad"
+    table = new_table("time, s", f"{drive}, {unit}", title="Knots of the spline", left=0)
+    for time_s, value in zip(schedule["knot_time_s"], knot_values(schedule), strict=True):
+        table.add_row(f"{time_s:.4f}", f"{value:.4f}")
     return table
 
 

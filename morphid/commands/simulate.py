@@ -108,7 +108,7 @@ def _put_rate(request: Request, rate: float, final: float, drive: str | None) ->
         raise CommandError(
             f"--rate {rate:g} --final {final:g}: these values do not define a morph",
             code=Exit.INVALID_INPUT,
-            hint="give a positive rate in rad/s, and a final angle in rad other than 0",
+            hint="give a positive rate in rad/s and a final angle in rad (m/s and m if it slides), not 0",
         )
     drives = aircraft_drives(request) or {}
     words = list(dict.fromkeys(each.word for each in drives.values()))
@@ -118,7 +118,9 @@ def _put_rate(request: Request, rate: float, final: float, drive: str | None) ->
             code=Exit.INVALID_INPUT,
             hint=f"name it: --drive {words[0]}; to choose from: {shown_names(drives)}",
         )
-    document = {"kind": "constant_rate", "final_rad": final, "rate_rad_s": rate}
+    moved = [each for each in drives.values() if drive in (None, each.name, each.word)]
+    unit = moved[0].unit if moved else "rad"
+    document = {"kind": "constant_rate", f"final_{unit}": final, f"rate_{unit}_s": rate}
     given = f"--rate {rate:g} --final {final:g}"
     request.put(
         f"/schedules/{drive or BOTH}", document, given if drive is None else f"{given} --drive {drive}"
@@ -173,11 +175,13 @@ SIMULATE = Particulars(
         "rate": Annotated[
             float | None,
             schedule_option(
-                "--rate", help="Instead of --schedule: move both wings at this mean rate, rad/s."
+                "--rate",
+                help="Instead of --schedule: move both wings at this mean rate, rad/s (m/s if they slide).",
             ),
         ],
         "final": Annotated[
-            float | None, schedule_option("--final", help="With --rate: angle at the end, rad.")
+            float | None,
+            schedule_option("--final", help="With --rate: angle at the end, rad (or extension, m)."),
         ],
         "drive": Annotated[
             str | None,

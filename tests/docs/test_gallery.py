@@ -33,7 +33,14 @@ def test_every_aircraft_is_complete(folder: Path) -> None:
 
 def test_there_are_as_many_as_promised() -> None:
     """Kinds of aircraft, each in its folder."""
-    assert [folder.name for folder in FOLDERS] == ["folding", "gull", "slender", "tailed_uav", "transport"]
+    assert [folder.name for folder in FOLDERS] == [
+        "folding",
+        "gull",
+        "slender",
+        "tailed_uav",
+        "telescope",
+        "transport",
+    ]
 
 
 @pytest.mark.slow

@@ -15,7 +15,8 @@ import pytest
 
 from morphcore.identify import Identification, IdentifyResult, SearchSettings
 from morphcore.models.equivalent import chain_model, physical_guess
-from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter, SurfaceRows
+from morphcore.models.parameters import CHAIN_PARAMETERS, Parameter
+from morphcore.models.surface_rows import SurfaceRows
 from morphcore.models.transforms import Linear
 from morphcore.multibody.kernels.articulated import L_MASS
 from morphcore.simulate.trajectory import Trajectory

@@ -12,7 +12,7 @@ from morphcore.optimise.feasible import morph_space
 from morphcore.optimise.flights import MorphFlights, sample_times
 from morphcore.optimise.optimisation import ScheduleOptimisation
 from morphcore.optimise.settings import ScheduleSettings
-from morphcore.simulate.plan import common_path
+from morphcore.simulate.common_path import common_path
 from morphcore.simulate.schedule import ConstantRate
 from morphdata.aircraft import Aircraft as AircraftDocument
 from morphdata.lattice import Lattice

@@ -9,7 +9,7 @@ from morphcore.errors import InvalidInput
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.optimise.feasible import morph_drives, morph_space, morph_word
 from morphcore.optimise.flights import MorphFlights, sample_times
-from morphcore.simulate.plan import common_path
+from morphcore.simulate.common_path import common_path
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphdata.lattice import Lattice
 from morphdata.optimize import Limits, Morph

@@ -12,7 +12,7 @@ from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.kernels.layout import LINKS_C
 from morphcore.optimise import flights as module
 from morphcore.optimise.flights import DIVERGED_ANGLE, Flown, MorphFlights, sample_times
-from morphcore.simulate.plan import common_path
+from morphcore.simulate.common_path import common_path
 from morphcore.simulate.schedule import ConstantRate, Spline
 from morphcore.simulate.time_grid import STEP_S
 from morphcore.stopping import Interrupted

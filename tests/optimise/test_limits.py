@@ -43,7 +43,7 @@ def random_points(space, count, seed=0):
 def sampled_slack(space, point):
     """What dense sampling of the schedule says is left of each limit, relative."""
     angle, rate, acceleration = sampled(space.schedule(point))
-    limits, change = space.limits, space.morph.change_rad
+    limits, change = space.limits, space.morph.change
     left = [np.inf]
     if limits.max_rate_rad_s is not None:
         left.append(1.0 - np.abs(rate).max() / limits.max_rate_rad_s)
@@ -118,7 +118,7 @@ def test_the_nearest_point_with_a_margin(space):
 @pytest.mark.parametrize("space", [s for s in SPACES if s.limits.max_rate_rad_s or s.limits.max_accel_rad_s2])
 def test_the_quickest_morph_is_slower_than_the_trapezoid_and_feasible(space):
     """No schedule beats the trapezoidal rate; the spline comes within 40 per cent, and keeps the limits."""
-    change, limits = abs(space.morph.change_rad), space.limits
+    change, limits = abs(space.morph.change), space.limits
     rate = limits.max_rate_rad_s or np.inf
     acceleration = limits.max_accel_rad_s2 or np.inf
     reaches_rate = change > rate**2 / acceleration

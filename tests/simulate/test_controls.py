@@ -11,9 +11,10 @@ from morphcore import load_aircraft, load_flight, simulate
 from morphcore.errors import InvalidInput
 from morphcore.geometry.aircraft import Aircraft, Flight
 from morphcore.models.equivalent import chain_model, physical_guess
+from morphcore.simulate.common_path import common_path
 from morphcore.simulate.control_motion import lagged_deflections
 from morphcore.simulate.hinge_schedules import followed_schedules, hinge_schedules
-from morphcore.simulate.plan import common_path, flight_plan
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate, Hold, Quadratic, Spline
 from morphcore.simulate.time_grid import time_grid
 from morphdata.aircraft import Aircraft as AircraftDocument

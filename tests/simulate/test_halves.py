@@ -16,7 +16,8 @@ from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
 from morphcore.models.equivalent import ChainModel, chain_model, lane_constants, physical_guess
 from morphcore.models.kinematics import whole_joints
 from morphcore.paper.computation import benchmark_swarm
-from morphcore.simulate.plan import common_path, flight_plan
+from morphcore.simulate.common_path import common_path
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate
 from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.trim import trim

@@ -14,8 +14,9 @@ from morphcore.models.equivalent import chain_model, lane_constants, physical_gu
 from morphcore.models.kernels.layout import JOINTS
 from morphcore.multibody.hinges import hinge_screws, relative_motion
 from morphcore.simulate.batch import state_rates
+from morphcore.simulate.common_path import path_angles
 from morphcore.simulate.flight import ModelChoice, Simulation
-from morphcore.simulate.plan import flight_plan, path_angles
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.schedule import ConstantRate, Hold, Spline
 from morphcore.simulate.time_grid import time_grid
 from morphcore.simulate.torque import hinge_torques

@@ -13,7 +13,8 @@ from morphcore.aero.environment import MovingAir, Wave
 from morphcore.aero.operator import lattice_operator
 from morphcore.errors import InvalidInput
 from morphcore.multibody.kernels.hinge import H_ORIGIN, H_TWIST
-from morphcore.simulate.plan import common_path, flight_plan, start_at
+from morphcore.simulate.common_path import common_path
+from morphcore.simulate.plan import flight_plan, start_at
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphcore.simulate.time_grid import STEP_S, time_grid
 from morphcore.simulate.wake import wake_direction

@@ -16,7 +16,7 @@ from morphcore.identify.sample_fit import SampleFit
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.parameters_document import parameters_document
 from morphcore.optimise.flights import MorphFlights, sample_times
-from morphcore.simulate.plan import common_path
+from morphcore.simulate.common_path import common_path
 from morphcore.simulate.request import simulation_from_document
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphdata.export import ExportRequest

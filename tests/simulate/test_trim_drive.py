@@ -15,8 +15,9 @@ from morphcore.frames import quaternion_from_euler
 from morphcore.identify.cost import costs, sample_cases
 from morphcore.models.equivalent import ChainModel, chain_model, physical_guess
 from morphcore.models.parameters_document import parameters_document
+from morphcore.simulate.common_path import common_path
 from morphcore.simulate.flight import Simulation
-from morphcore.simulate.plan import common_path, flight_plan
+from morphcore.simulate.plan import flight_plan
 from morphcore.simulate.request import simulation_from_document
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphcore.simulate.trim import trim, trimmed_state

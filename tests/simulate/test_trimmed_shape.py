@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from morphcore.geometry.aircraft import Aircraft, Start
 from morphcore.models.equivalent import chain_model, physical_guess
 from morphcore.models.kinematics import bent_shape, tip_bending
-from morphcore.simulate.plan import common_path, flight_plan, start_at
+from morphcore.simulate.common_path import common_path
+from morphcore.simulate.plan import flight_plan, start_at
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.trim import Trim, trim

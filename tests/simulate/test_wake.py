@@ -13,9 +13,10 @@ from morphcore.aero.operator import lattice_operator
 from morphcore.geometry.aircraft import Aircraft
 from morphcore.models.equivalent import ChainModel, chain_model, physical_guess
 from morphcore.models.flexible import flexible_model
+from morphcore.simulate.common_path import common_path
 from morphcore.simulate.flexible import FlexibleFlight, hinge_path
 from morphcore.simulate.flexible_trim import FlexibleTrim, trim_flexible
-from morphcore.simulate.plan import common_path, flight_plan, start_at
+from morphcore.simulate.plan import flight_plan, start_at
 from morphcore.simulate.schedule import ConstantRate, Hold
 from morphcore.simulate.time_grid import TimeGrid
 from morphcore.simulate.trim import Trim, trim

@@ -39,18 +39,12 @@ OUTPUTS, MORE_OUTPUTS = 5, 3
 # m: middle of the trailing edge, x of the centre of circulation; the trailing edge, in the sense of the
 # lifting circulation, per width of the strip; unit vector of the chord, forward, and its y over x; centroid
 # of the strip's vortex moment along x
-EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y, CHORD_SLOPE, VORTEX_X = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-)
+EDGE_X, CENTRE_X, EDGE_DX, EDGE_DY, EDGE_Y, CHORD_X, CHORD_Y, CHORD_SLOPE, VORTEX_X = range(9)
 STRIP_COLUMNS = 9
+# where a surface telescopes, further columns, 0 on others: ends of the strip, m from the root along the axis;
+# area weighted by the share of the profile drag, m^2; integral of the chord squared, m^3
+INBOARD, OUTBOARD, AREA, AREA_CHORD = range(STRIP_COLUMNS, STRIP_COLUMNS + 4)
+SLIDING_COLUMNS = 4
 # rows of a link's constants after its mass properties: drag area (m^2) and its y (m); of the slow and of the
 # fast lag the decay over half a step and the weight of a step; lift factor; aerodynamic-centre offset (m,
 # forward); slope of the sections (twist less zero-lift angle) at the link's origin, and its growth along y
@@ -68,6 +62,7 @@ JONES_MEAN_LAG = JONES_A1 / JONES_B1 + JONES_A2 / JONES_B2  # semichords
 # columns of the table of surfaces
 LINK0, LINKS, STRIP0, STRIPS, PAIR0, PAIRED, MORE0 = 0, 1, 2, 3, 4, 5, 6
 CONTROL0, CONTROLLED, CONTROL_END, LUMPED = 7, 8, 9, 10
+TELESCOPES = 11  # sign of the span (+1 right, -1 left) if the surface telescopes, else 0
 
 
 @inlined

@@ -13,6 +13,7 @@ from morphcore.aero.kernels.loads import (
     LINKS,
     LUMPED,
     PAIRED,
+    TELESCOPES,
     control_inputs,
     lagged_motion,
     lane_product,
@@ -44,7 +45,9 @@ from morphcore.models.kernels.layout import (
     joint_rows_of_scratch,
     link_rows_of_scratch,
     state_rows,
+    visible_rows_of_scratch,
 )
+from morphcore.models.kernels.telescope import visible_links
 from morphcore.multibody.kernels.articulated import (
     LINK_ROWS,
     accumulate,
@@ -206,8 +209,17 @@ def accelerations(
 
     # air loads
     effective = scratch[w_effective : w_effective + 3 * links]
+    w_seen, w_seen_joints, _, w_seen_overlap = visible_rows_of_scratch(links, coordinates)
     for s in range(surfaces.shape[0]):
-        strip_inputs(lanes, surfaces[s], ranges, strips, overlap, effective, inputs)
+        if surfaces[s, TELESCOPES] != 0:
+            visible_links(
+                lanes, surfaces[s], strips, constants[LINKS_C:], scratch[S_SUMS : S_SUMS + 2],
+                scratch[w_seen:w_seen_joints], scratch[w_seen_overlap:],
+            )  # fmt: skip
+            shares = scratch[w_seen_overlap:]
+        else:
+            shares = overlap
+        strip_inputs(lanes, surfaces[s], ranges, strips, shares, effective, inputs)
         if surfaces[s, CONTROL_END] > 0:
             for k in range(surfaces[s, LINKS]):
                 link = surfaces[s, LINK0] + k
@@ -238,11 +250,15 @@ def accelerations(
                 shared[LIMITS:], outputs, scratch[S_SUMS : S_SUMS + 6],
             )  # fmt: skip
     for s in range(surfaces.shape[0]):
+        if surfaces[s, TELESCOPES] != 0:
+            rows, shares = scratch[w_seen:w_seen_joints], scratch[w_seen_overlap:]
+        else:
+            rows, shares = constants[LINKS_C:], overlap
         for k in range(surfaces[s, LINKS]):
             link = surfaces[s, LINK0] + k
             link_wrench(
-                lanes, surfaces[s], k, ranges, strips, overlap, outputs,
-                constants[LINKS_C + LINK_ROWS * link : LINKS_C + LINK_ROWS * link + LINK_ROWS],
+                lanes, surfaces[s], k, ranges, strips, shares, outputs,
+                rows[LINK_ROWS * link : LINK_ROWS * link + LINK_ROWS],
                 scratch[w_twist + 6 * link : w_twist + 6 * link + 6],
                 density,
                 scratch[S_SUMS : S_SUMS + 6],

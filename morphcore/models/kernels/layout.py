@@ -49,6 +49,14 @@ def gravity_rows_of_scratch(links: int) -> int:
 
 
 @inlined
+def visible_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int, int, int]:
+    """First scratch rows, where surfaces telescope, of links, joint stiffness and damping, and overlap."""
+    first = joint_rows_of_scratch(links, coordinates)[-1]
+    stiffness = first + LINK_ROWS * links
+    return first, stiffness, stiffness + coordinates, stiffness + 2 * coordinates
+
+
+@inlined
 def joint_rows_of_scratch(links: int, coordinates: int) -> tuple[int, int, int, int, int]:
     """First scratch rows of joint forces, added diagonal, accelerations, gimbals; and the row after them."""
     first = S_FREE + 30 * links

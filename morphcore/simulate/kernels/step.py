@@ -50,7 +50,9 @@ from morphcore.models.kernels.layout import (
     constant_rows,
     joint_rows_of_scratch,
     state_rows,
+    visible_rows_of_scratch,
 )
+from morphcore.models.kernels.telescope import held_joints, telescopes
 from morphcore.multibody.kernels.articulated import LINK_ROWS
 
 GAMMA = 9.0 / 16.0
@@ -237,10 +239,15 @@ def stage(
     w_tau, w_added, w_joint_acceleration, _, _ = joint_rows_of_scratch(links, coordinates)
     s_q, s_v, s_slow, _, _, _ = state_rows(links, coordinates)
     c_stiffness, c_damping, _ = constant_rows(links, coordinates)
+    stiffness = constants[c_stiffness : c_stiffness + coordinates]
+    damping = constants[c_damping : c_damping + coordinates]
+    if telescopes(surfaces):
+        _, w_stiffness, w_damping, w_overlap = visible_rows_of_scratch(links, coordinates)
+        held = scratch[w_stiffness:w_damping], scratch[w_damping:w_overlap]
+        held_joints(lanes, surfaces, strips, constants[LINKS_C:], stiffness, damping, held[0], held[1])
+        stiffness, damping = held[0], held[1]
     joint_forces(
-        lanes,
-        constants[c_stiffness : c_stiffness + coordinates],
-        constants[c_damping : c_damping + coordinates],
+        lanes, stiffness, damping,
         middle[s_q:s_v], middle[s_v:s_slow],
         last[s_q:s_v], before[s_q:s_v], last[s_v:s_slow], before[s_v:s_slow], step,
         scratch[w_tau : w_tau + coordinates], scratch[w_added : w_added + coordinates],
