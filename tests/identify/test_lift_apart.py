@@ -11,8 +11,10 @@ import pytest
 
 from morphcore.identify import Identification, IdentifyResult, SearchSettings
 from morphcore.identify.cost import fly_attitudes, sample_cases, shared_trims
+from morphcore.identify.evidence import left_out
+from morphcore.identify.free_corrections import OWN_LIFT
 from morphcore.identify.identification import VERSION
-from morphcore.identify.lift_apart import LIFT_APART, is_apart, left_out
+from morphcore.identify.rounds import Prepared
 from morphcore.search.checkpoint import unpack
 from morphcore.search.run import SearchState
 from morphcore.simulate.trajectory import Trajectory
@@ -35,6 +37,12 @@ def checkpoints(run: Identification, begin: bytes | None = None) -> list[bytes]:
     return [step.checkpoint for step in run.steps(begin)]
 
 
+def further(checkpoint: bytes) -> tuple[str, ...]:
+    """What a search has freed by a checkpoint."""
+    prepared = unpack(checkpoint, VERSION, SearchState).prepared
+    return prepared.further if isinstance(prepared, Prepared) else ()
+
+
 @cache
 def found() -> tuple[Identification, IdentifyResult, list[bytes]]:
     """From flights of an aircraft whose tail has another factor."""
@@ -47,19 +55,18 @@ def test_factors_that_differ_are_told_apart() -> None:
     """The search frees them by itself, says so, and finds them."""
     run, result, _ = found()
     document = result.to_document()
-    phases = [row["phase"] for row in document["search"]["history"]]
-    assert phases.count(LIFT_APART) == 1
+    assert run.further == (OWN_LIFT,)
     assert document["search"]["own_lift"] == ["tail"]
     value, error = (document["uncertainty"][name] for name in ("value", "standard_error"))
     for name, true in LIFT.items():
         assert abs(value[name] - true) <= 2.0 * error[name], name
-    assert run.space.names == run.apart_space.names
+    assert "tail.lift_factor" in run.space.names
 
 
 def test_a_search_resumed_anywhere_ends_the_same() -> None:
     """Before and after the factors are freed, to the bit."""
     _, _, every = found()
-    freed = next(k for k, each in enumerate(every) if is_apart(unpack(each, VERSION, SearchState)))
+    freed = next(k for k, each in enumerate(every) if further(each))
     for checkpoint in every[freed - 1 : freed + 1]:
         again = identification(samples())
         last = checkpoints(again, checkpoint)[-1]
@@ -69,8 +76,8 @@ def test_a_search_resumed_anywhere_ends_the_same() -> None:
 def test_factors_that_are_the_same_stay_one() -> None:
     """Flights of an aircraft with one factor: nothing is gained."""
     run = identification(tuple(_with_one_factor()))
-    state = run.state(checkpoints(run)[-1])
-    assert LIFT_APART not in [row["phase"] for row in state.history]
+    run.state(checkpoints(run)[-1])
+    assert OWN_LIFT not in run.further
     assert "tail.lift_factor" not in run.space.names
 
 
@@ -90,8 +97,8 @@ def _with_one_factor() -> list[Trajectory]:
 def test_what_is_not_tried(flights: int, options: dict[str, Any]) -> None:
     """Two flights cannot judge each other, a request decides by itself, and a rigid wing misses too much."""
     run = identification(samples()[:flights], **options)
-    state = run.state(checkpoints(run)[-1])
-    assert LIFT_APART not in [row["phase"] for row in state.history]
+    run.state(checkpoints(run)[-1])
+    assert OWN_LIFT not in run.further
 
 
 def test_j_of_flights_left_out() -> None:
@@ -113,4 +120,4 @@ def test_aircraft_of_one_pair_have_nothing_to_tell() -> None:
     alone = Identification(
         aircraft(NAMES[:2]), flight(), samples(), EquivalentModel(lattice=LATTICE, step_s=0.01)
     )
-    assert alone.apart_space.names == alone.space.names
+    assert OWN_LIFT not in alone.spare

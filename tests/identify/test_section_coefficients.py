@@ -112,7 +112,7 @@ def test_nothing_is_freed_that_flights_do_not_call_for(noise_rad: float) -> None
     run = cambered_chain(noise_rad)
     *_, last = run.steps()
     run.state(last.checkpoint)
-    assert run.further_corrections == ()
+    assert run.further == ()
 
 
 @pytest.mark.parametrize("section", [{"cm0": -0.05}, TRUTH])
@@ -121,7 +121,7 @@ def test_what_flights_call_for_is_freed_and_found(section: dict[str, float]) -> 
     run = cambered_chain(**section)
     *_, last = run.steps()
     found = run.space.decode(run.state(last.checkpoint).best)
-    assert set(run.further_corrections) >= set(section)
+    assert set(run.further) >= set(section)
     for name in TRUTH:
         assert float(found[name].flat[0]) == pytest.approx(section.get(name, 0.0), abs=4e-3)
 
