@@ -30,7 +30,7 @@ from morphdata.stations import (
     row_chords,
     station_faults,
 )
-from morphdata.telescopes import telescope_faults
+from morphdata.telescopes import inner_panel_faults, telescope_faults
 
 MAX_SURFACES = 16
 
@@ -339,6 +339,7 @@ class Aircraft(Document):
         """Check that surface names are unique and that each drive turns equal hinges."""
         yield from drive_faults(self.surfaces)
         yield from control_faults(self.surfaces)
+        yield from inner_panel_faults(self.surfaces)
         names: set[str] = set()
         for number, surface in enumerate(self.surfaces):
             if surface.name in names:

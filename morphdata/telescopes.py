@@ -95,6 +95,30 @@ def telescoping(surfaces: Iterable[Any]) -> list[str]:
     return [surface.name for surface in surfaces if mouth_m(surface) is not None]
 
 
+def inner_panel_faults(surfaces: Sequence[Any]) -> Iterator[Fault]:
+    """Check that no inner panel bends: the panel that slides out of it would not follow its tip.
+
+    surfaces : documents of all; a panel whose tip is within half its root chord of a mouth holds that.
+    """
+    for surface in surfaces:
+        if mouth_m(surface) is None:
+            continue
+        mouth = surface.all_hinges[-1].position_m
+        for number, other in enumerate(surfaces):
+            if other is surface or other.side != surface.side or not other.flexible:
+                continue
+            length = other.span_m / math.cos(other.sweep_rad)
+            line = span_line_B(other)
+            tip = [root + length * along for root, along in zip(other.root_m, line, strict=True)]
+            if math.dist(tip, mouth) < 0.5 * other.root_and_tip_chord_m[0]:
+                yield Fault(
+                    "not_supported",
+                    f"{other.name!r} bends, and {surface.name!r}, which slides out of it, does not follow.",
+                    f"/surfaces/{number}/flexible",
+                    "Give the inner panel flexible: false.",
+                )
+
+
 def unsupported_faults(
     names: Sequence[str],
     *,

@@ -10,10 +10,13 @@ import pytest
 from morphcore import simulate
 from morphcore.geometry.aircraft import Aircraft as Resolved
 from morphdata.aircraft import Aircraft
+from morphdata.environment import Environment, Gust, Turbulence
 from morphdata.faults import InvalidInput
+from morphdata.lattice import Lattice
 from morphdata.optimize import Limits, Morph, goal_faults
 from morphdata.samples import InlineSample
 from morphdata.schedules import Schedules
+from morphdata.simulate import SimulateRequest
 from morphdata.telescopes import span_line_B
 from tests.simulate.telescoped import FLIGHT, extended, telescoped
 
@@ -140,3 +143,55 @@ def test_apparent_mass_of_a_telescoping_wing_is_refused() -> None:
     """It would have to follow the visible span."""
     with pytest.raises(InvalidInput, match="telescopes"):
         simulate(telescoped(), {**FLIGHT, "apparent_mass": True}, {}, duration_s=0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "pointer"),
+    [
+        ({"environment": Environment(gust=Gust(amplitude_m_s=1.0, gradient_m=5.0))}, "/environment"),
+        ({"environment": Environment(turbulence=Turbulence(sigma_high_m_s=1.0))}, "/environment"),
+        ({"lattice": Lattice(shape="trimmed")}, "/model/lattice/shape"),
+        ({"channels": ["p", "section_cl"]}, "/channels/1"),
+        ({"channels": ["drive_force"], "model": "flexible"}, "/channels/0"),
+    ],
+)
+def test_what_does_not_follow_the_visible_span_is_refused(options: dict[str, Any], pointer: str) -> None:
+    """By library and service alike; steady flights and whole loads of the same aircraft fly."""
+    with pytest.raises(InvalidInput, match="telescopes") as refusal:
+        simulate(telescoped(), FLIGHT, {}, duration_s=0.1, **options)
+    assert [fault.pointer for fault in refusal.value.faults] == [pointer]
+    kind = {"kind": options.get("model", "rigid")}
+    request: dict[str, Any] = {
+        "aircraft": telescoped(),
+        "flight": FLIGHT,
+        "schedules": {},
+        "duration_s": 0.1,
+        "model": kind,
+    }
+    if "lattice" in options:
+        kind["lattice"] = options["lattice"].model_dump(exclude_none=True)
+    if "environment" in options:
+        request["environment"] = options["environment"].model_dump(exclude_none=True)
+    if "channels" in options:
+        request["channels"] = options["channels"]
+    with pytest.raises(InvalidInput) as refusal:
+        SimulateRequest.parse(request)
+    assert pointer in [fault.pointer for fault in refusal.value.faults]
+
+
+def test_limits_of_the_panels_lift_are_refused() -> None:
+    """Those of its strips change with the extension."""
+    document = telescoped()
+    document["surfaces"][1]["cl_max"] = 1.4
+    with pytest.raises(InvalidInput, match="telescopes") as refusal:
+        Aircraft.parse(document)
+    assert refusal.value.faults[0].pointer == "/surfaces/1/cl_max"
+
+
+def test_an_inner_panel_does_not_bend() -> None:
+    """The outer one would not follow its tip."""
+    document = telescoped()
+    document["surfaces"][0]["flexible"] = True
+    with pytest.raises(InvalidInput, match="does not follow") as refusal:
+        Aircraft.parse(document)
+    assert refusal.value.faults[0].pointer == "/surfaces/0/flexible"
