@@ -97,6 +97,13 @@ def strict_models(kind: type[Document] = Document) -> Iterator[type[Document]]:
         yield from strict_models(model)
 
 
+def alternatives(schema: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """What a value may be instead of another, choices within choices included."""
+    yield schema
+    for each in (*schema.get("anyOf", ()), *schema.get("oneOf", ())):
+        yield from alternatives(each)
+
+
 def whole_fields() -> list[tuple[type[Document], str, bool]]:
     """Every field that the JSON schema calls an integer, or a list of such."""
     from app.main import create_app  # noqa: F401 - loads every model
@@ -104,9 +111,9 @@ def whole_fields() -> list[tuple[type[Document], str, bool]]:
     found = []
     for model in set(strict_models()):
         for name, schema in model.model_json_schema()["properties"].items():
-            options = [schema, *schema.get("anyOf", ())]
-            kinds = {option.get("type") for option in options}
-            kinds |= {"array of " + o["items"].get("type", "") for o in options if "items" in o}
+            kinds = {each.get("type") for each in alternatives(schema)}
+            for each in alternatives(schema):
+                kinds |= {f"array of {item.get('type')}" for item in alternatives(each.get("items", {}))}
             if kinds & {"integer", "array of integer"} and "number" not in kinds:
                 found.append((model, name, "array of integer" in kinds))
     return sorted(found, key=lambda item: (item[0].__name__, item[1]))
