@@ -70,8 +70,10 @@ class _Balance:
         loose.setflags(write=False)
         self.loose = replace(model.beams, stiffness=loose)
         self.flexibility = np.linalg.inv(model.beams.stiffness)
-        still = self.loads(self.unbent, first, first)
-        self.weight_n = float(np.linalg.norm(self.total(self.unbent, still)[3:]))
+        at_rest = self.unbent.copy()
+        self.chains.place(model.beams.rest, at_rest)
+        still = self.loads(at_rest, first, first)
+        self.weight_n = float(np.linalg.norm(self.total(at_rest, still)[3:]))
 
     @property
     def unknowns(self) -> int:
