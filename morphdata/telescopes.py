@@ -139,28 +139,28 @@ def unsupported_faults(
     """
     requested = [
         (
-            "apparent mass",
+            "Apparent mass",
             apparent_mass,
             "/flight/apparent_mass",
             "Leave it out; it matters for light wings.",
         ),
         (
-            "trimmed shape of the lattice",
+            "A trimmed shape of the lattice",
             lattice_shape == "trimmed",
             "/model/lattice/shape",
             'Use "undeformed".',
         ),
-        ("gust or turbulence", moving_air, "/environment", "Leave them out; steady wind is possible."),
+        ("A gust or turbulence", moving_air, "/environment", "Leave them out; steady wind is possible."),
     ]
     for number, channel in enumerate(channels):
         per_strip, force = channel.startswith("section_"), channel == "drive_force" and flexible
         hint = "Simulate the rigid or the equivalent model." if force else "Request loads of whole surfaces."
-        requested.append((f"channel {channel}", per_strip or force, f"/channels/{number}", hint))
+        requested.append((f"The channel {channel}", per_strip or force, f"/channels/{number}", hint))
     for what, given, pointer, hint in requested:
         if given and names:
             yield Fault(
                 "not_supported",
-                f"The {what} of {names[0]!r}, which telescopes, is not supported.",
+                f"{what} is not supported for {names[0]!r}, which telescopes.",
                 pointer,
                 hint,
             )
