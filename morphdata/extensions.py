@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import FailFast, Field
 
-from morphdata.base import Document
 from morphdata.drives import Extension, Unit
 from morphdata.faults import Fault
 from morphdata.history import (
@@ -15,6 +14,7 @@ from morphdata.history import (
     MAX_KNOTS,
     ClockTime,
     Duration,
+    ExtensionHistory,
     Moment,
     Rate,
     history_faults,
@@ -22,29 +22,19 @@ from morphdata.history import (
 )
 from morphdata.samplefiles.flight import MAX_ROWS
 
-UNIT: Unit = "m"
 
-
-class HeldExtension(Document):
+class HeldExtension(ExtensionHistory):
     """A prismatic hinge that does not move."""
 
+    values: ClassVar[tuple[str, ...]] = ("extension_m",)
     kind: Literal["hold"]
     extension_m: Extension
 
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return UNIT
 
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Extensions that it names, with their pointers."""
-        yield self.extension_m, "extension_m"
-
-
-class ConstantRateExtension(Document):
+class ConstantRateExtension(ExtensionHistory):
     """From one extension to another at constant rate, with ramps of the rate inside the duration."""
 
+    values: ClassVar[tuple[str, ...]] = ("initial_m", "final_m")
     kind: Literal["constant_rate"]
     initial_m: Extension = 0.0
     final_m: Extension
@@ -58,87 +48,48 @@ class ConstantRateExtension(Document):
     )
 
     @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return UNIT
-
-    @property
     def morph_s(self) -> float:
         """Duration of the morph, as given or from the mean rate."""
         if self.duration_s is not None:
             return self.duration_s
         return abs(self.final_m - self.initial_m) / (self.rate_m_s or 1.0)
 
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Extensions that it names, with their pointers."""
-        yield self.initial_m, "initial_m"
-        yield self.final_m, "final_m"
-
     def faults(self) -> Iterator[Fault]:
         """Check that duration or rate is given, and that the ramps fit into the morph."""
-        yield from rate_faults(self.duration_s, self.rate_m_s, self.morph_s, self.ramp_s, UNIT)
+        yield from rate_faults(self.duration_s, self.rate_m_s, self.morph_s, self.ramp_s, self.unit)
 
 
-class QuadraticExtension(Document):
+class QuadraticExtension(ExtensionHistory):
     """Extension quadratic in time, then held."""
 
+    values: ClassVar[tuple[str, ...]] = ("initial_m", "final_m")
     kind: Literal["quadratic"]
     initial_m: Extension = 0.0
     final_m: Extension
     duration_s: Duration
     start_s: Moment = 0.0
 
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return UNIT
 
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Extensions that it names, with their pointers."""
-        yield self.initial_m, "initial_m"
-        yield self.final_m, "final_m"
-
-
-class SplineExtension(Document):
+class SplineExtension(ExtensionHistory):
     """Clamped cubic spline through knots: at rest before the first and after the last."""
 
+    values: ClassVar[tuple[str, ...]] = ("knot_extension_m",)
     kind: Literal["spline"]
     knot_time_s: Annotated[list[ClockTime], FailFast(), Field(min_length=2, max_length=MAX_KNOTS)]
     knot_extension_m: Annotated[list[Extension], FailFast(), Field(min_length=2, max_length=MAX_KNOTS)]
-
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return UNIT
-
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Extensions that it names, with their pointers."""
-        yield from ((value, f"knot_extension_m/{row}") for row, value in enumerate(self.knot_extension_m))
 
     def faults(self) -> Iterator[Fault]:
         """Check that there is an extension for every time, and that time increases."""
         yield from history_faults(self, "knot_time_s", "knot_extension_m", "extension")
 
 
-class TabulatedExtension(Document):
+class TabulatedExtension(ExtensionHistory):
     """A history in rows, interpolated differentiably; held before the first row and after the last."""
 
+    values: ClassVar[tuple[str, ...]] = ("extension_m",)
     kind: Literal["tabulated"]
     time_s: Annotated[list[ClockTime], FailFast(), Field(min_length=3, max_length=MAX_ROWS)]
     extension_m: Annotated[list[Extension], FailFast(), Field(min_length=3, max_length=MAX_ROWS)]
-
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return UNIT
-
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Extensions that it names, with their pointers."""
-        yield from ((value, f"extension_m/{row}") for row, value in enumerate(self.extension_m))
 
     def faults(self) -> Iterator[Fault]:
         """Check that there is an extension for every time, and that time increases."""

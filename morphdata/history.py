@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -21,6 +21,43 @@ Moment = Annotated[float, Field(ge=0.0, le=MAX_DURATION_S)]
 Duration = Annotated[float, Field(gt=0.0, le=MAX_DURATION_S)]
 ClockTime = Annotated[float, Field(ge=-MAX_DURATION_S, le=1e6)]
 Rate = Annotated[float, Field(gt=0.0, le=100.0)]
+
+
+class History(Document):
+    """What moves, over time.
+
+    Attributes
+    ----------
+    unit : {"rad", "m"}
+        Of what moves.
+    values : tuple of str
+        Fields that hold angles or extensions, or lists of them.
+    """
+
+    unit: ClassVar[Unit]
+    values: ClassVar[tuple[str, ...]]
+
+    @property
+    def named(self) -> Iterator[tuple[float, str]]:
+        """Angles or extensions that it names, with their pointers."""
+        for field in self.values:
+            given = getattr(self, field)
+            if isinstance(given, list):
+                yield from ((value, f"{field}/{row}") for row, value in enumerate(given))
+            else:
+                yield given, field
+
+
+class AngleHistory(History):
+    """Of a drive that turns."""
+
+    unit: ClassVar[Unit] = "rad"
+
+
+class ExtensionHistory(History):
+    """Of a drive that slides."""
+
+    unit: ClassVar[Unit] = "m"
 
 
 def rate_faults(

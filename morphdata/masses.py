@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated
+from typing import Annotated, Protocol
 
 from pydantic import Field
 
@@ -17,6 +17,60 @@ MIN_FORWARD = 0.5  # cosine of 60 degrees, of a thrust's direction to the body's
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Offset = Annotated[float, Field(ge=-50.0, le=50.0)]
+
+
+class Placed(Protocol):
+    """What is on the fuselage, or on a surface."""
+
+    @property
+    def position_m(self) -> Sequence[float] | None:
+        """On the fuselage."""
+
+    @property
+    def surface(self) -> str | None:
+        """Name of the surface."""
+
+    @property
+    def at(self) -> float | None:
+        """Share of its span."""
+
+    @property
+    def offset_m(self) -> Sequence[float] | None:
+        """Of mid-chord there."""
+
+
+def place_faults(placed: Placed, what: str) -> Iterator[Fault]:
+    """Check that a place is given once and completely; ``what`` is placed, a word."""
+    if placed.surface is None:
+        for name in ("at", "offset_m"):
+            if getattr(placed, name) is not None:
+                yield Fault(
+                    "surface_missing",
+                    f"{name} is a place on a surface, but no surface is named.",
+                    f"/{name}",
+                    "Add surface, or give position_m on the fuselage instead.",
+                )
+        if placed.position_m is None and placed.at is None:
+            yield Fault(
+                "missing",
+                f"The place of the {what} is not given.",
+                "/position_m",
+                "Give position_m on the fuselage, or surface and at.",
+            )
+    elif placed.position_m is not None:
+        yield Fault(
+            "given_twice",
+            "position_m is a place on the fuselage, but a surface is named, too.",
+            "/position_m",
+            "Give either position_m, or surface and at (with offset_m).",
+        )
+    elif placed.at is None:
+        yield Fault(
+            "missing",
+            "The place on the surface is not given.",
+            "/at",
+            "Add at, the share of the span: 0 at the root, 1 at the tip.",
+        )
 
 
 class PointMass(Document):
@@ -41,36 +95,7 @@ class PointMass(Document):
     def faults(self) -> Iterator[Fault]:
         """Check that the place is given once and completely, and that the inertia is that of a body."""
         yield from inertia_faults(self.inertia_kg_m2)
-        if self.surface is None:
-            for name in ("at", "offset_m"):
-                if getattr(self, name) is not None:
-                    yield Fault(
-                        "surface_missing",
-                        f"{name} is a place on a surface, but no surface is named.",
-                        f"/{name}",
-                        "Add surface, or give position_m on the fuselage instead.",
-                    )
-            if self.position_m is None and self.at is None:
-                yield Fault(
-                    "missing",
-                    "The place of the mass is not given.",
-                    "/position_m",
-                    "Give position_m on the fuselage, or surface and at.",
-                )
-        elif self.position_m is not None:
-            yield Fault(
-                "given_twice",
-                "position_m is a place on the fuselage, but a surface is named, too.",
-                "/position_m",
-                "Give either position_m, or surface and at (with offset_m).",
-            )
-        elif self.at is None:
-            yield Fault(
-                "missing",
-                "The place on the surface is not given.",
-                "/at",
-                "Add at, the share of the span: 0 at the root, 1 at the tip.",
-            )
+        yield from place_faults(self, "mass")
 
 
 class Propulsion(Document):

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from morphdata.base import Document, Position, Text
 from morphdata.faults import Fault
-from morphdata.masses import Offset, Share
+from morphdata.masses import Offset, Share, place_faults
 
 MAX_POINTS = 32
 
@@ -31,36 +31,7 @@ class Point(Document):
 
     def faults(self) -> Iterator[Fault]:
         """Check that the place is given once and completely."""
-        on_surface = [name for name in ("at", "offset_m") if getattr(self, name) is not None]
-        if self.surface is None:
-            for name in on_surface:
-                yield Fault(
-                    "surface_missing",
-                    f"{name} is a place on a surface, but no surface is named.",
-                    f"/{name}",
-                    "Add surface, or give position_m on the fuselage instead.",
-                )
-            if self.position_m is None and not on_surface:
-                yield Fault(
-                    "missing",
-                    "The place of the point is not given.",
-                    "/position_m",
-                    "Give position_m on the fuselage, or surface and at.",
-                )
-        elif self.position_m is not None:
-            yield Fault(
-                "given_twice",
-                "position_m is a place on the fuselage, but a surface is named, too.",
-                "/position_m",
-                "Give either position_m, or surface and at (with offset_m).",
-            )
-        elif self.at is None:
-            yield Fault(
-                "missing",
-                "The place on the surface is not given.",
-                "/at",
-                "Add at, the share of the span: 0 at the root, 1 at the tip.",
-            )
+        yield from place_faults(self, "point")
 
 
 Points = Annotated[list[Point], Field(max_length=MAX_POINTS)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import islice, pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
     ConfigDict,
@@ -29,6 +29,7 @@ from morphdata.faults import Fault, InvalidInput, refuse
 from morphdata.history import (
     DEFAULT_RAMP_S,
     MAX_KNOTS,
+    AngleHistory,
     ClockTime,
     Duration,
     Moment,
@@ -53,25 +54,18 @@ EXAMPLE_SCHEDULE: dict[str, Any] = {
 }
 
 
-class Hold(Document):
+class Hold(AngleHistory):
     """A hinge that does not move."""
 
+    values: ClassVar[tuple[str, ...]] = ("angle_rad",)
     kind: Literal["hold"]
     angle_rad: Angle = 0.0
 
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return "rad"
 
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Angles that it names, with their pointers."""
-        yield self.angle_rad, "angle_rad"
-
-
-class ConstantRate(Document):
+class ConstantRate(AngleHistory):
     """From one angle to another at constant rate, with ramps of the rate inside the duration."""
+
+    values: ClassVar[tuple[str, ...]] = ("initial_rad", "final_rad")
 
     model_config = ConfigDict(json_schema_extra={"examples": [EXAMPLE_SCHEDULE]})
 
@@ -94,81 +88,42 @@ class ConstantRate(Document):
             return self.duration_s
         return abs(self.final_rad - self.initial_rad) / (self.rate_rad_s or 1.0)
 
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return "rad"
-
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Angles that it names, with their pointers."""
-        yield self.initial_rad, "initial_rad"
-        yield self.final_rad, "final_rad"
-
     def faults(self) -> Iterator[Fault]:
         """Check that duration or rate is given, and that the ramps fit into the morph."""
         yield from rate_faults(self.duration_s, self.rate_rad_s, self.morph_s, self.ramp_s, self.unit)
 
 
-class Quadratic(Document):
+class Quadratic(AngleHistory):
     """Angle quadratic in time, then held."""
 
+    values: ClassVar[tuple[str, ...]] = ("initial_rad", "final_rad")
     kind: Literal["quadratic"]
     initial_rad: Angle = 0.0
     final_rad: Angle
     duration_s: Duration
     start_s: Moment = 0.0
 
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return "rad"
 
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Angles that it names, with their pointers."""
-        yield self.initial_rad, "initial_rad"
-        yield self.final_rad, "final_rad"
-
-
-class Spline(Document):
+class Spline(AngleHistory):
     """Clamped cubic spline through knots: at rest before the first and after the last."""
 
+    values: ClassVar[tuple[str, ...]] = ("knot_angle_rad",)
     kind: Literal["spline"]
     knot_time_s: Annotated[list[ClockTime], FailFast(), Field(min_length=2, max_length=MAX_KNOTS)]
     knot_angle_rad: Annotated[list[Angle], FailFast(), Field(min_length=2, max_length=MAX_KNOTS)]
-
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return "rad"
-
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Angles that it names, with their pointers."""
-        yield from ((angle, f"knot_angle_rad/{row}") for row, angle in enumerate(self.knot_angle_rad))
 
     def faults(self) -> Iterator[Fault]:
         """Check that there is an angle for every time, and that time increases."""
         yield from history_faults(self, "knot_time_s", "knot_angle_rad", "angle")
 
 
-class Tabulated(Document):
+class Tabulated(AngleHistory):
     """A history in rows, interpolated differentiably; held before the first row and after the last."""
 
+    values: ClassVar[tuple[str, ...]] = ("angle_rad",)
     kind: Literal["tabulated"]
     time_s: Annotated[list[ClockTime], FailFast(), Field(min_length=3, max_length=MAX_ROWS)]
     angle_rad: Annotated[list[Angle], FailFast(), Field(min_length=3, max_length=MAX_ROWS)]
-
-    @property
-    def unit(self) -> Unit:
-        """Of its history."""
-        return "rad"
-
-    @property
-    def named(self) -> Iterator[tuple[float, str]]:
-        """Angles that it names, with their pointers."""
-        yield from ((angle, f"angle_rad/{row}") for row, angle in enumerate(self.angle_rad))
 
     def faults(self) -> Iterator[Fault]:
         """Check that there is an angle for every time, and that time increases."""

@@ -7,14 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from morphcore.geometry.moved_part import MovedPart
 from morphdata import controls as documents
-from morphdata.drives import ANGLE_TOLERANCE_RAD, Unit
+from morphdata.drives import Unit
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Control:
+class Control(MovedPart):
     """A trailing-edge control of prescribed deflection; mirror images are equal, whatever their drives.
 
     Attributes
@@ -57,26 +58,6 @@ class Control:
         )
 
     @property
-    def low(self) -> float:
-        """Smallest angle, rad."""
-        return self.min_rad
-
-    @property
-    def high(self) -> float:
-        """Largest angle, rad."""
-        return self.max_rad
-
-    @property
-    def held(self) -> float:
-        """Angle held if no history is given, rad."""
-        return self.angle_rad
-
-    @property
     def unit(self) -> Unit:
         """Of its history."""
         return "rad"
-
-    def beyond_range(self, angle_rad: Array) -> NDArray[np.int64]:
-        """Rows of a history of angles (k,) that are out of range."""
-        low, high = self.min_rad - ANGLE_TOLERANCE_RAD, self.max_rad + ANGLE_TOLERANCE_RAD
-        return np.flatnonzero((angle_rad < low) | (angle_rad > high))

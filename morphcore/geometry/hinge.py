@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from morphcore.frames import skew
+from morphcore.geometry.moved_part import MovedPart
 from morphdata import drives as documents
-from morphdata.drives import ANGLE_TOLERANCE_RAD, drive_name
+from morphdata.drives import drive_name
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -26,7 +27,7 @@ UPRIGHT.setflags(write=False)
 
 
 @dataclass(frozen=True)
-class Hinge:
+class Hinge(MovedPart):
     """A joint of prescribed motion; hinges that move alike are equal, whatever their drives.
 
     Attributes
@@ -69,29 +70,9 @@ class Hinge:
         )
 
     @property
-    def low(self) -> float:
-        """Smallest angle or extension."""
-        return self.min_rad
-
-    @property
-    def high(self) -> float:
-        """Largest angle or extension."""
-        return self.max_rad
-
-    @property
-    def held(self) -> float:
-        """Angle or extension held if no history is given."""
-        return self.angle_rad
-
-    @property
     def unit(self) -> documents.Unit:
         """Of its history."""
         return "m" if self.prismatic else "rad"
-
-    def beyond_range(self, angle_rad: Array) -> NDArray[np.int64]:
-        """Rows of a history of angles (k,) that are out of range."""
-        low, high = self.min_rad - ANGLE_TOLERANCE_RAD, self.max_rad + ANGLE_TOLERANCE_RAD
-        return np.flatnonzero((angle_rad < low) | (angle_rad > high))
 
     def rotation(self, angle_rad: Array) -> Array:
         """Turns about the axis by angles (k,), (k, 3, 3): Rodrigues' formula; none if it slides."""
